@@ -23,7 +23,7 @@ C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/*/*.[ch] fmi/*.[ch] plan
 EMPTY :=
 TEST_ROOMS := $(subst $(EMPTY) $(EMPTY),:,$(filter-out tests/native tests/conftest.py,$(wildcard tests/[a-z]*[a-z])))
 SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_state fmi_values) $(wildcard tests/exchange/test_*.py) \
-	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
+	$(patsubst %,tests/plant/test_plant_%.py,state coordinates misuse)
 COVERED := $(patsubst %,tests/%,fmi exchange plant native_control friction ground soil servos)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 

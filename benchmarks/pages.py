@@ -18,7 +18,7 @@ from PIL import Image
 
 from benchmarks import ROOT
 from hexapod_cosim.cosim.common.files import write_text
-from hexapod_cosim.cosim.results.uncertainty import Comparisons, compare_all
+from hexapod_cosim.cosim.results.side_by_side import Comparisons, compare_all
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.controls import parse_controls
 from hexapod_cosim.cosim.scenario.reading import load_scenario

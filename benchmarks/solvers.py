@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from benchmarks import RESULTS
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.files import atomic_text
-from hexapod_cosim.cosim.results.metrics import METRICS
-from hexapod_cosim.cosim.run.preparation import chosen_gains
+from hexapod_cosim.cosim.results.metric_table import METRICS
+from hexapod_cosim.cosim.run.plan import chosen_gains
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD

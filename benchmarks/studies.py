@@ -18,7 +18,7 @@ import matplotlib
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.run.batch import run_batch
-from hexapod_cosim.cosim.run.preparation import chosen_gains
+from hexapod_cosim.cosim.run.plan import chosen_gains
 from hexapod_cosim.cosim.run.worker_pool import processor_count
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -76,7 +76,7 @@ def per_minute(plans: Sequence[Scenario], gains: Gains | None, *, workers: int) 
 def _design_time(cache: Path) -> float:
     """Returns the time until gains are there in a new process that uses a cache folder [s]."""
     program = (
-        "from hexapod_cosim.cosim.run.preparation import chosen_gains as gains;"
+        "from hexapod_cosim.cosim.run.plan import chosen_gains as gains;"
         "from hexapod_cosim.cosim.scenario.reading import load_scenario as load;"
         f"gains(load('walk_flat', overrides=['control={CONTROL}']))"
     )

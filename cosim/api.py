@@ -19,7 +19,7 @@ from hexapod_cosim.controller import Gains, load_gains
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.master.loop import FAILED, Progress
 from hexapod_cosim.cosim.report.writing import write_report
-from hexapod_cosim.cosim.results.comparison import SEEDS, write_seeds
+from hexapod_cosim.cosim.results.facts import Result, gait_differences
 from hexapod_cosim.cosim.results.folder import (
     ResultsFolder,
     read_scenario,
@@ -27,10 +27,13 @@ from hexapod_cosim.cosim.results.folder import (
     stored_result,
     write_result,
 )
-from hexapod_cosim.cosim.results.gait_choice import gait_differences
-from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.side_by_side import (
+    SEEDS,
+    compare_all,
+    write_comparison,
+    write_seeds,
+)
 from hexapod_cosim.cosim.results.summary import summarise
-from hexapod_cosim.cosim.results.uncertainty import compare_all, write_comparison
 from hexapod_cosim.cosim.run.single_run import simulate as run_scenario
 from hexapod_cosim.cosim.scenario.controls import (
     Control,

@@ -24,7 +24,7 @@ from typing import Any
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
-from hexapod_cosim.cosim.run.preparation import chosen_gains
+from hexapod_cosim.cosim.run.plan import chosen_gains
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.extensions.live import server as live_server
 from hexapod_cosim.extensions.live.loop import Loop

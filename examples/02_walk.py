@@ -3,7 +3,7 @@
 usage: python examples/02_walk.py
 """
 
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.cosim.run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 

@@ -7,7 +7,7 @@ import numpy as np
 
 import hexapod_cosim
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
-from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.models import Robot
 
 

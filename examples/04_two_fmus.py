@@ -12,7 +12,7 @@ from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
 from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
-from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.models import load_robot
 
 STEP, STEPS, SPEED = 0.005, 1000, 0.08  # s, 1, m/s

@@ -72,7 +72,7 @@ def main() -> None:
         write_mcap(log, path)
         print(f"{path.name}: {len(log.time)} rows, {len(log.names) - 1} columns")
     if len(sys.argv) < 2:
-        print("the log is deleted again; keep it: python examples/05_robot_log.py log.mcap")
+        print("the log is deleted again; keep it: python 05_robot_log.py log.mcap")
     print("identify it with: hexapod identify log.mcap --robot athena -o out/identified")
 
 

@@ -343,6 +343,10 @@ class Compliance(Stateful):
         torque = (torque + plan.own) * self.trust
         self.torque = clamp(torque, -self.most, self.most) if self.parts.limits else torque
 
+    def raised(self) -> tuple[Array, bool]:
+        """Returns the height offsets of the feet (6,) [m] (C36), and whether they are changing."""
+        return self.touchdown.offset, self.touchdown.busy()
+
     def meets(self) -> Mask:
         """Returns the feet (6,) that have met the ground on their way down (C51).
 

@@ -226,7 +226,7 @@ class Compliant(Stateful):
             else:
                 self.hold.reset()
         self.count += 1
-        offset, climb, busy = laws.touchdown.offset, stance.climb, laws.touchdown.busy()
+        climb, (offset, busy) = stance.climb, laws.raised()
         raised = offset + self.hold.lift
         output.angle_ref[...] = self._correct(output.angle_ref, climb, raised)
         output.torque_ref[...] = laws.torque

@@ -19,7 +19,7 @@ from hexapod_cosim.cosim.cli.failures import (
     report_failure,
     usage_parts,
 )
-from hexapod_cosim.cosim.cli.json_output import json_alone
+from hexapod_cosim.cosim.cli.terminal import json_alone
 
 NO_MEMORY = (
     "the memory is full; give a smaller file or fewer rows, or run `hexapod --debug ...` to see "

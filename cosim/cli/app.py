@@ -23,11 +23,11 @@ CORE = (
     ("simulate", "Run one co-simulation: results, metrics, plots.", "simulate_command:simulate"),
     ("compare", "Run walks under several controls and report them.", "compare_command:compare"),
     ("design", "Design the gains of compliant and paper control.", "design_command:design"),
-    ("report", "Make the plots and the report of a folder again.", "report_command:report"),
-    ("controller", "Write a controller of your own.", "controller_command:app"),
-    ("examples", "Copy the example programs and notebooks.", "examples_command:examples"),
-    ("validate", "Check an FMU of ours and say what is wrong.", "validate_command:validate"),
-    ("terrain", "Show a kind of ground.", "terrain_command:terrain"),
+    ("report", "Make the plots and the report of a folder again.", "short_commands:report"),
+    ("controller", "Write a controller of your own.", "short_commands:app"),
+    ("examples", "Copy the example programs and notebooks.", "short_commands:examples"),
+    ("validate", "Check an FMU of ours and say what is wrong.", "short_commands:validate"),
+    ("terrain", "Show a kind of ground.", "short_commands:terrain"),
     ("list", "List robots, scenarios, gaits, terrains and others.", "listing:list_what"),
 )
 

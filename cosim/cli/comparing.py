@@ -9,16 +9,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.cli.accuracy_check import check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
     RunError,
     RunOptions,
     Words,
+    check_accuracy,
     chosen_controls,
     default_folder,
     drawing,
     run_into,
+    show_accuracy,
     show_rows,
     titled,
 )
@@ -33,15 +34,11 @@ from hexapod_cosim.cosim.cli.terminal import (
 from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
-from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.figures import draw_figures
-from hexapod_cosim.cosim.report.writing import about, comparison_rows, write_report
+from hexapod_cosim.cosim.report.tables import about, comparison_rows, with_errors
+from hexapod_cosim.cosim.report.writing import write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
-from hexapod_cosim.cosim.results.comparison import (
-    SEEDS,
-    SEEDS_PARTIAL,
-    write_seeds,
-)
+from hexapod_cosim.cosim.results.facts import Result, gait_differences
 from hexapod_cosim.cosim.results.folder import (
     ACCURACY,
     METRICS_FILE,
@@ -50,14 +47,20 @@ from hexapod_cosim.cosim.results.folder import (
     results_folder,
     stored_result,
 )
-from hexapod_cosim.cosim.results.gait_choice import gait_differences
-from hexapod_cosim.cosim.results.metrics import has_net_slip
-from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.metric_table import has_net_slip
+from hexapod_cosim.cosim.results.side_by_side import (
+    SEEDS,
+    SEEDS_PARTIAL,
+    Comparisons,
+    compare_all,
+    write_comparison,
+    write_seeds,
+)
 from hexapod_cosim.cosim.results.summary import Summary, summarise
-from hexapod_cosim.cosim.results.uncertainty import Comparisons, compare_all, write_comparison
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.gait_selection import select_gait
-from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
+from hexapod_cosim.cosim.run.plan import chosen_gains
+from hexapod_cosim.cosim.run.plant import PlantFmus
 from hexapod_cosim.cosim.scenario.controls import CHOOSER, Control
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import CHOSEN, COMPARED, CONTROLS, OWN, Scenario

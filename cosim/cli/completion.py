@@ -23,7 +23,7 @@ def _offering(words: Callable[[], Iterable[tuple[str, str]]]) -> Complete:
 
 
 def _scenarios() -> Iterator[tuple[str, str]]:
-    from hexapod_cosim.cosim.scenario.bundled import list_scenarios
+    from hexapod_cosim.cosim.scenario import list_scenarios
 
     for name, path in list_scenarios().items():
         yield name, str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", ""))

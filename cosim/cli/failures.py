@@ -11,7 +11,7 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
-from hexapod_cosim.cosim.cli.width import fitted
+from hexapod_cosim.cosim.cli.terminal import fitted
 
 SUCCESS, FAILURE, USAGE, FELL, INTERRUPT = 0, 1, 2, 3, 130
 EXIT_CODES = {

@@ -30,7 +30,7 @@ def robots() -> Rows:
 
 def scenarios() -> Rows:
     """Returns the bundled scenarios."""
-    from hexapod_cosim.cosim.scenario.bundled import list_scenarios
+    from hexapod_cosim.cosim.scenario import list_scenarios
 
     return titles(list_scenarios())
 

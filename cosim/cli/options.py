@@ -50,7 +50,7 @@ def _tried_fmu(context: typer.Context, path: Path | None) -> Path | None:
     The completion of a command line does not try it.
     """
     if path is not None and not context.resilient_parsing:
-        from hexapod_cosim.cosim.control.trial import refuse_crashing
+        from hexapod_cosim.cosim.control.fmu_instance import refuse_crashing
 
         refuse_crashing(path)
     return path

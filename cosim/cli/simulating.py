@@ -7,30 +7,31 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.cli.accuracy_check import check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
     RunOptions,
     Words,
+    check_accuracy,
     chosen_controls,
     default_folder,
     drawing,
     run_into,
+    show_accuracy,
     show_rows,
     titled,
 )
 from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_text, warn
-from hexapod_cosim.cosim.report.accuracy import with_errors
-from hexapod_cosim.cosim.report.writing import metric_rows, write_report
+from hexapod_cosim.cosim.report.tables import metric_rows, with_errors
+from hexapod_cosim.cosim.report.writing import write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
+from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.folder import (
     ACCURACY,
     results_folder,
     stored_result,
     write_accuracy,
 )
-from hexapod_cosim.cosim.results.metrics import has_net_slip
-from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.metric_table import has_net_slip
 from hexapod_cosim.cosim.results.summary import summarise
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Scenario

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, redirect_stdout
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any
-
-from hexapod_cosim.cosim.cli.json_output import restore_output
-from hexapod_cosim.cosim.cli.width import columns_of, fitted
+from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     import typer
@@ -23,6 +21,14 @@ EVERY = 30.0  # s    between two lines of progress in a log
 
 Show = Callable[[float, str], None]  # amount done, text behind the bar
 Count = Callable[..., None]  # number of runs done, number of failed ones
+
+USUAL = 80  # characters; where the width is unknown
+LEAST = 20
+INDENT = "  "  # of the continuation of a wrapped line
+
+STDOUT, STDERR = 1, 2  # descriptors
+
+_redirections: list[ExitStack] = []  # of the running command
 
 
 def refuse_unused(
@@ -218,3 +224,65 @@ def counting_bar(label: str, total: int, *, plain: bool = False) -> Iterator[Cou
             show(done, ", ".join(filter(None, texts)))
 
         yield report
+
+
+def columns_of(stream: TextIO) -> int | None:
+    """Returns the width of a stream's terminal, or None if it is none; COLUMNS overrides it."""
+    if not stream.isatty():
+        return None
+    given = os.environ.get("COLUMNS", "")
+    if given.isdecimal() and int(given):
+        return max(int(given), LEAST)
+    try:
+        return max(os.get_terminal_size(stream.fileno()).columns, LEAST)
+    except (OSError, ValueError):  # no real terminal
+        return USUAL
+
+
+def fitted(text: str, stream: TextIO) -> str:
+    """Returns text wrapped for this stream; words, such as paths, stay whole."""
+    width = columns_of(stream)
+    if width is None:
+        return text
+    wrapped = (
+        textwrap.wrap(
+            line, width, subsequent_indent=INDENT, break_long_words=False, break_on_hyphens=False
+        )
+        for line in text.split("\n")
+    )
+    return "\n".join("\n".join(lines) for lines in wrapped)
+
+
+@contextmanager
+def json_alone(*, wanted: bool) -> Iterator[None]:
+    """Sends standard output of the block to stderr until `restore_output` is called, if wanted."""
+    if not wanted:
+        yield
+        return
+    with ExitStack() as kept:
+        kept.enter_context(_printed_on_stderr())
+        _redirections.append(kept)
+        try:
+            yield
+        finally:
+            _redirections.remove(kept)
+
+
+def restore_output() -> None:
+    """Ends the redirection of the running command, so that its JSON can be printed."""
+    for kept in reversed(_redirections):
+        kept.close()
+
+
+@contextmanager
+def _printed_on_stderr() -> Iterator[None]:
+    """Sends standard output to stderr: Python's, that of C code and that of new processes."""
+    sys.stdout.flush()
+    kept = os.dup(STDOUT)
+    os.dup2(STDERR, STDOUT)
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        os.dup2(kept, STDOUT)
+        os.close(kept)

@@ -18,7 +18,7 @@ from hexapod_cosim.models.errors import FmuError
 DISTRIBUTION = "hexapod-cosim"
 GENERATED_SOURCES = ("variables.h", "variables.c", "defaults.c")
 # files of the plant that every component contains
-SHARED_SOURCES = ("status.c", "checksum.c", "range_check.c", "message.c")
+SHARED_SOURCES = ("shared.c", "message.c")
 SHARED_HEADERS = (
     *("status.h", "legs.h", "inside.h", "range_check.h", "message.h"),
     "shared_work.h",

@@ -1,41 +1,49 @@
-"""Temporary folders that a later process deletes if their own process was killed."""
+"""Temporary folders, objects that a with statement closes, and locks of folders."""
 
 from __future__ import annotations
 
 import os
 import shutil
+import sys
 import tempfile
-import time
 import weakref
-from contextlib import suppress
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Self
 
-from filelock import FileLock, Timeout
+if sys.platform != "win32":
+    import fcntl
 
-PREFIX = "hexapod-"
-LOCK = ".lock"  # held as long as the folder is in use; the system releases a killed process's
-SETTLED = 60.0  # s  a younger folder may not have its lock yet
+
+class Closing(ABC):
+    """An object that holds resources until close() or the end of its with statement."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Releases the resources."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 class TemporaryFolder:
-    """A folder in the system's temporary one. Creating it deletes those of killed processes.
+    """A folder in the system's temporary one.
 
     As a context manager it returns the folder's path. What is not closed is deleted when the
-    process ends.
+    process ends; the system deletes what a killed process leaves.
 
     Args:
         use: a word for the folder's name.
     """
 
     def __init__(self, use: str) -> None:
-        sweep()
-        self.path = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{use}-"))
-        lock = FileLock(
-            self.path / LOCK, blocking=False, fallback_to_soft=False, thread_local=False
-        )
-        with suppress(OSError):  # a file system without locks: the folder is not swept
-            lock.acquire()
-        self._delete = weakref.finalize(self, _delete, self.path, lock)
+        self.path = Path(tempfile.mkdtemp(prefix=f"hexapod-{use}-"))
+        self._delete = weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
 
     def close(self) -> None:
         """Deletes the folder; may be called twice."""
@@ -48,35 +56,20 @@ class TemporaryFolder:
         self.close()
 
 
-def _delete(folder: Path, lock: FileLock) -> None:
-    """Releases a folder's lock, because Windows deletes no open file, and deletes the folder."""
-    lock.release()
-    shutil.rmtree(folder, ignore_errors=True)
+def lock_folder(folder: Path) -> Callable[[], object] | None:
+    """Locks an existing folder; returns what releases it, or None when another process has it.
 
-
-def sweep(*, now: float | None = None) -> list[Path]:
-    """Deletes the folders whose process has ended without doing so, and returns them.
-
-    now: seconds since the epoch, for tests.
+    The folder itself is locked, so that no file is left in it and the system releases the lock of a
+    killed process. Nothing is locked where the system cannot lock a folder, as on Windows.
     """
-    deleted = []
-    present = time.time() if now is None else now
-    for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
-        if _is_abandoned(folder, present):
-            shutil.rmtree(folder, ignore_errors=True)
-            deleted.append(folder)
-    return deleted
-
-
-def _is_abandoned(folder: Path, now: float) -> bool:
-    """Returns whether a folder is this user's, has a lock, and no process holds it."""
+    if sys.platform == "win32":
+        return lambda: None
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        facts = folder.lstat()
-        own = not hasattr(os, "getuid") or facts.st_uid == os.getuid()
-        lock = folder / LOCK
-        if folder.is_symlink() or not own or not lock.is_file() or now - facts.st_mtime < SETTLED:
-            return False
-        with FileLock(lock, blocking=False, fallback_to_soft=False):
-            return True
-    except (OSError, Timeout):  # in use, or deleted by another process
-        return False
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(handle)
+        return None
+    except OSError:  # a file system that locks no folders
+        pass
+    return partial(os.close, handle)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.controller import Controller, ControllerError
-from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
+from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu, refuse_crashing
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw
 from hexapod_cosim.cosim.control.python_law import (
     PythonLaw,
@@ -19,11 +19,10 @@ from hexapod_cosim.cosim.control.python_law import (
     load_class,
     parameters_of,
 )
-from hexapod_cosim.cosim.control.trial import refuse_crashing
 from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.master.connection import Connection, connect, names_of_map, read_map
-from hexapod_cosim.cosim.master.fmu import FmuVariable
+from hexapod_cosim.cosim.master.fmu_block import FmuVariable
 from hexapod_cosim.cosim.scenario.controls import (
     FMU,
     MAP,

@@ -20,18 +20,20 @@ from hexapod_cosim.cosim.common.plant_files import (
     binary,
     fmi2_platform,
     fmi3_platform,
+    licence_file,
     source_files,
 )
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.export.extras import extra_members
+from hexapod_cosim.cosim.export.documentation import render_html
+from hexapod_cosim.cosim.export.picture import draw_robot
 from hexapod_cosim.cosim.export.platforms import (
     build_binaries,
     choose_platforms,
     component_library,
 )
 from hexapod_cosim.cosim.export.reference import reference_members
-from hexapod_cosim.cosim.export.start_values import start_values
-from hexapod_cosim.cosim.export.starts import with_starts
+from hexapod_cosim.cosim.export.start_values import start_values, with_starts
+from hexapod_cosim.cosim.interface.arrays import arrays
 from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
     load_controller_interface,
@@ -39,7 +41,12 @@ from hexapod_cosim.cosim.interface.controller import (
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.interface.model_description3 import render_build_description, render_fmi3
 from hexapod_cosim.cosim.interface.plant import Interface, load_interface
-from hexapod_cosim.cosim.interface.variants import for_binaries
+from hexapod_cosim.cosim.interface.terminals import (
+    FOLDER,
+    ICON,
+    render_terminals,
+    render_terminals3,
+)
 from hexapod_cosim.models.errors import FmuError
 from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.grid_file import grid_bytes
@@ -51,6 +58,14 @@ from hexapod_cosim.models.validation.laws import check_contact_surface
 FMI_VERSIONS = (2, 3)
 NOTHING: Mapping[str, bytes] = MappingProxyType({})
 TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # of every member, so that archives are reproducible
+
+# in a binary that a compiler without complex numbers built (plant_fmu/src/plant/continuous.c)
+NO_DERIVATIVES = b"derivatives: got a call in a binary without complex numbers"
+
+# path of the model's picture by version of the standard
+PICTURES = {2: "model.png", 3: "documentation/diagram.png"}
+LICENCE = "documentation/licenses/license.txt"
+PICTURE_SIZE, ICON_SIZE = (480, 360), (160, 160)  # pixels
 
 
 def export_fmu(
@@ -228,3 +243,45 @@ def _member(name: str, compression: int) -> zipfile.ZipInfo:
     info.create_system = 3  # Unix, wherever it is packed
     info.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
     return info
+
+
+def for_binaries(interface: Interface, binaries: Mapping[str, bytes]) -> Interface:
+    """Returns the interface that all of these binaries have: without directional derivatives if
+    one was built by a compiler without complex numbers, such as Microsoft's.
+    """
+    lacking = any(NO_DERIVATIVES in data for data in binaries.values())
+    return replace(interface, directional_derivatives=False) if lacking else interface
+
+
+def extra_members(
+    interface: Interface, description: str, *, fmi: int = 2, reference: bool = False
+) -> dict[str, bytes]:
+    """Returns the files by path in the archive.
+
+    Args:
+        interface: of the FMU.
+        description: the FMU's modelDescription.xml.
+        fmi: version of the standard.
+        reference: whether the archive contains reference results.
+    """
+    ports = [
+        array.name for array in arrays(interface) if array.first.causality in ("input", "output")
+    ]
+    terminals = render_terminals(list(interface.by_name)) if fmi == 2 else render_terminals3(ports)
+    return {
+        "documentation/index.html": render_html(
+            interface, description, picture=PICTURES[fmi], reference=reference
+        ).encode(),
+        LICENCE: licence_file().read_bytes(),
+        f"{FOLDER}/terminalsAndIcons.xml": terminals.encode(),
+        **pictures(interface, fmi=fmi),
+    }
+
+
+def pictures(interface: Interface, *, fmi: int = 2) -> dict[str, bytes]:
+    """Returns the robot's picture and icon by path in the archive."""
+    sizes = {PICTURES[fmi]: PICTURE_SIZE, f"{FOLDER}/{ICON}": ICON_SIZE}
+    return {
+        path: draw_robot(interface.robot, width=width, height=height)
+        for path, (width, height) in sizes.items()
+    }

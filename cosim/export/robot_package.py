@@ -14,7 +14,7 @@ from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.export.platforms import choose_platforms
 from hexapod_cosim.cosim.export.ssp import NOTHING, Experiment, export_ssp
-from hexapod_cosim.cosim.export.starts import with_starts
+from hexapod_cosim.cosim.export.start_values import with_starts
 from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
     load_controller_interface,

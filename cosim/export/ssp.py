@@ -20,7 +20,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from hexapod_cosim.cosim.common.plant_files import DISTRIBUTION, package_version
 from hexapod_cosim.cosim.export.plant import write_archive
-from hexapod_cosim.cosim.export.starts import check_range, enumeration_error, unknown_error
+from hexapod_cosim.cosim.export.start_values import check_range, enumeration_error, unknown_error
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.models.errors import FmuError
 

@@ -26,14 +26,20 @@ def expand(
         yield entry, dict(zip(used, combination, strict=True))
 
 
-def with_defaults(entry: Mapping[str, Any], causality: str) -> dict[str, Any]:
-    """Returns an entry of interface.toml with the values that follow from its name and causality.
+def with_defaults(
+    entry: Mapping[str, Any], causality: str, units: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Returns an entry of interface.toml with the values that follow from name, causality and unit.
 
     Parameters are fields of nested structures: {leg}.{joint}.mass is leg[leg].link[joint].mass.
     Others are arrays over their axes: {leg}.foot.force[i] is foot.force[leg][i].
     """
     name = entry["name"]
-    defaults = {} if "type" in entry else {"unit": "1", "nominal": 1.0}
+    defaults: dict[str, Any] = {"size": 3} if "[i]" in name else {}
+    if "type" not in entry:
+        unit = entry.get("unit", "1")
+        usual = units[unit].get("nominal", 1.0) if isinstance(units[unit], dict) else 1.0
+        defaults |= {"unit": unit, "nominal": usual}
     if causality == "parameter":
         place = re.sub(r"_\{(\w+)\}", r"[\1]", name)
         place = place.replace("{leg}.", "leg[leg].").replace("{joint}.", "link[joint].")

@@ -254,7 +254,7 @@ def read_table(component: Component) -> dict[str, Any]:
     table = tomllib.loads(interface_file(component).read_text(encoding="utf-8"))
     for causality in CAUSALITIES:
         entries = table.get(causality, [])
-        table[causality] = [with_defaults(entry, causality) for entry in entries]
+        table[causality] = [with_defaults(entry, causality, table["unit"]) for entry in entries]
     return table
 
 
@@ -302,7 +302,9 @@ def _unit(name: str, entry: Any) -> Unit:
         if "display" in entry
         else None
     )
-    exponents = {key: value for key, value in entry.items() if key not in ("display", "type")}
+    exponents = {
+        key: value for key, value in entry.items() if key not in ("display", "type", "nominal")
+    }
     return Unit(name=name, exponents=exponents, display=display, type=entry.get("type"))
 
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.cosim.interface.names import vector_names
-from hexapod_cosim.cosim.master.fmu import FmuVariable
+from hexapod_cosim.cosim.master.fmu_block import FmuVariable
 from hexapod_cosim.cosim.master.sensors import CONTACT, MEASURED, READINGS
 from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, COMMANDS, JOINT_COMMANDS
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError, nearest_name

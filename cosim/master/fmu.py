@@ -7,106 +7,23 @@ import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir, suppress
-from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.archives import unpack
 from hexapod_cosim.cosim.common.binaries import refuse_incomplete
-from hexapod_cosim.cosim.common.closing import Closing
 from hexapod_cosim.cosim.common.plant_files import packed_binary
-from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
 from hexapod_cosim.cosim.interface.descriptions import read_description
+from hexapod_cosim.cosim.master.fmu_block import FmuBlock, FmuVariable, StepError, parameter_number
 from hexapod_cosim.cosim.master.fmu_log import STATUS, WARNING, FmuLog
-from hexapod_cosim.models.errors import FmuError, nearest_name, unknown_name
+from hexapod_cosim.models.errors import FmuError, nearest_name
 
 LAST_SUCCESSFUL_TIME = 2  # fmi2StatusKind
-SUFFIX = {  # of fmi2Get... and fmi2Set... for each FMI type
-    "Real": "Real",
-    "Integer": "Integer",
-    "Enumeration": "Integer",
-    "Boolean": "Boolean",
-}
-
-
-class StepError(FmuError):
-    """The FMU discarded or refused a step.
-
-    `reached` is the last time [s] for which the FMU's state is valid; NaN when it does not say.
-    """
-
-    def __init__(self, what: str, *, reached: float, **facts: Any) -> None:
-        super().__init__(what, **facts)
-        self.reached = reached
-
-
-@dataclass(frozen=True)
-class FmuVariable:
-    """A variable of an FMU."""
-
-    name: str
-    causality: str
-    real: bool  # whether it is a floating-point variable
-    flag: bool  # whether it is a Boolean variable
-    size: int  # number of elements; 1 for a scalar
-
-
-class FmuBlock:
-    """Variables of one type that are read or written in one call.
-
-    The arguments of the C calls are converted once, here, so that a call allocates nothing.
-
-    `buffer`: a contiguous array for the values, float64 for Reals and int32 for all other types;
-    without one, the block allocates its own.
-    """
-
-    def __init__(
-        self,
-        fmu: Fmu,
-        names: Sequence[str],
-        kind: str,
-        references: Sequence[int],
-        buffer: NDArray[Any] | None,
-    ) -> None:
-        dtype = np.dtype(np.float64 if kind == "Real" else np.int32)
-        values = np.zeros(len(names), dtype) if buffer is None else buffer
-        if values.dtype != dtype or values.shape != (len(names),) or not values.flags.c_contiguous:
-            got = f"{values.dtype} {values.shape}, {values.strides[:1]} bytes apart"
-            raise FmuError(
-                "not a buffer for these variables",
-                got=got,
-                expected=f"{dtype} ({len(names)},), contiguous",
-            )
-        self.names, self.values = tuple(names), values
-        self._fmu = fmu
-        numbers = (ctypes.c_uint * len(names))(*references)
-        size, address = ctypes.c_size_t(len(names)), ctypes.c_void_p(values.ctypes.data)
-        self._get = fmu.bind(f"fmi2Get{SUFFIX[kind]}", numbers, size, address)
-        self._set = fmu.bind(f"fmi2Set{SUFFIX[kind]}", numbers, size, address)
-
-    def get(self) -> None:
-        """Reads all values from the FMU. Raises FmuError."""
-        self._call(self._get, "the FMU does not give its outputs")
-
-    def try_set(self) -> int:
-        """Writes all values to the FMU and returns the FMI status."""
-        self._fmu.clear_log()
-        return self._set()
-
-    def set(self) -> None:
-        """Writes all values to the FMU. Raises FmuError."""
-        self._call(self._set, "the FMU does not take its inputs")
-
-    def _call(self, call: Callable[[], int], what: str) -> None:
-        self._fmu.clear_log()
-        status = call()
-        if status > WARNING:
-            raise self._fmu.failure(what, status)
 
 
 class Fmu(Closing):
@@ -119,19 +36,23 @@ class Fmu(Closing):
         self.path = Path(path)
         self.description = read_description(self.path)
         self.variables = {variable.name: variable for variable in self.description.modelVariables}
-        self._names: dict[tuple[str, str], list[str]] = {}  # by causality and type
         self._logged = FmuLog()
         self._log = self._logged.messages
         self.clear_log = self._log.clear  # called before each call: errors quote new messages only
         self._directory = TemporaryFolder("fmu")
         self._slave: Any = None
         self._initialised = False
-        self._grids: dict[str, int] | None = None  # numbers of grid files by their digest
         try:
             self._instantiate(name)
         except Exception as error:
+            message = self._log[-1] if self._log else str(error)
             self.close()
-            raise self._load_error(error) from error
+            if isinstance(error, FmuError):
+                raise
+            fix = "export it again on this machine with `hexapod export`"
+            raise FmuError(
+                "the FMU cannot be loaded", got=message, fix=fix, where=str(self.path)
+            ) from error
 
     def _instantiate(self, name: str) -> None:
         """Unpacks the FMU, loads its binary and creates the instance, which logs to our FmuLog."""
@@ -158,13 +79,6 @@ class Fmu(Closing):
         no_state_prior = ctypes.c_int(1)  # noSetFMUStatePriorToCurrentPoint = true
         self._do_step = self.bind("fmi2DoStep", self._begin, self._length, no_state_prior)
 
-    def _load_error(self, error: Exception) -> FmuError:
-        if isinstance(error, FmuError):
-            return error
-        message = self._log[-1] if self._log else str(error)
-        fix = "export it again on this machine with `hexapod export`"
-        return FmuError("the FMU cannot be loaded", got=message, fix=fix, where=str(self.path))
-
     @property
     def described(self) -> list[FmuVariable]:
         """The variables of the FMU, of all causalities."""
@@ -181,9 +95,9 @@ class Fmu(Closing):
         return hashlib.sha256(self.path.read_bytes()).hexdigest()
 
     @property
-    def resources(self) -> str:
-        """URI of the unpacked resources, as an instantiation takes it."""
-        return (self._directory.path / "resources").resolve().as_uri()
+    def resources(self) -> Path:
+        """Folder of the unpacked resources of this instance."""
+        return self._directory.path / "resources"
 
     @property
     def component(self) -> int:
@@ -212,40 +126,13 @@ class Fmu(Closing):
         """Returns the FMU's last message, or the status where it gave none."""
         return self._log[-1] if self._log else f"status {STATUS[status]} without a message"
 
-    def provide_grid(self, content: bytes) -> int:
-        """Puts a grid file into the unpacked resources of this instance, and returns its number.
-
-        A grid file of equal content is not written again. The number is a value of terrain.grid.
-        """
-        folder = self._directory.path / "resources" / "terrain"
-        if self._grids is None:
-            present = [path for path in folder.glob("*.terrain") if path.stem.isdecimal()]
-            self._grids = {
-                hashlib.sha256(path.read_bytes()).hexdigest(): int(path.stem) for path in present
-            }
-        digest = hashlib.sha256(content).hexdigest()
-        if digest not in self._grids:
-            number = 1 + max(self._grids.values(), default=0)
-            folder.mkdir(parents=True, exist_ok=True)
-            (folder / f"{number}.terrain").write_bytes(content)
-            self._grids[digest] = number
-        return self._grids[digest]
-
-    def grid(self, number: int) -> bytes | None:
-        """Returns the content of a grid file in the resources of this instance; None without it."""
-        path = self._directory.path / "resources" / "terrain" / f"{number}.terrain"
-        return path.read_bytes() if path.is_file() else None
-
     def names(self, causality: str, kind: str = "Real") -> list[str]:
         """Names of all variables of a causality and FMI type, in model description order."""
-        key = causality, kind
-        if key not in self._names:
-            self._names[key] = [
-                name
-                for name, variable in self.variables.items()
-                if (variable.causality, variable.type) == key
-            ]
-        return list(self._names[key])
+        return [
+            name
+            for name, variable in self.variables.items()
+            if (variable.causality, variable.type) == (causality, kind)
+        ]
 
     def references(self, names: Sequence[str]) -> list[int]:
         """Value references by name. Raises FmuError for a name the FMU lacks."""
@@ -296,8 +183,8 @@ class Fmu(Closing):
         """
         kinds: dict[str, dict[str, float]] = {}
         for name, value in values.items():
-            kind = self._parameter(name).type
-            kinds.setdefault(kind, {})[name] = self._number(name, value)
+            variable = self._parameter(name)
+            kinds.setdefault(variable.type, {})[name] = parameter_number(variable, value)
         blocks = [self.block(list(numbers)) for numbers in kinds.values()]
         for block, numbers in zip(blocks, kinds.values(), strict=True):
             block.values[:] = list(numbers.values())
@@ -326,36 +213,17 @@ class Fmu(Closing):
         """Returns the variable of a parameter. Raises FmuError when the name is none."""
         variable = self.variables.get(name)
         if variable is None:
-            kinds = ("Real", "Integer", "Enumeration", "Boolean")
-            raise self._unknown(name, [n for kind in kinds for n in self.names("parameter", kind)])
+            raise self._unknown(name, [n for b in self._parameter_blocks for n in b.names])
         if variable.causality != "parameter":
+            pushed = name.startswith("torso.push")
             raise FmuError(
                 "not a parameter",
                 got=name,
                 expected=f"a parameter, and this is an {variable.causality}",
-                fix="[[events]] push the torso"
-                if name.startswith("torso.push")
-                else "set a parameter",
+                fix="[[events]] push the torso" if pushed else "set a parameter",
                 where=self.path.name,
             )
         return variable
-
-    def _number(self, name: str, value: Any) -> float:
-        """Converts a value of a parameter to the number that the FMU takes."""
-        variable = self.variables[name]
-        if isinstance(value, str) and variable.type == "Enumeration":
-            items = {item.name: item.value for item in variable.declaredType.items}
-            if value not in items:
-                raise unknown_name(f"choice for {name}", value, items, error=FmuError)
-            return int(items[value])
-        if not isinstance(value, int | float):
-            raise FmuError(
-                f"parameter {name} is refused",
-                got=value,
-                expected=f"a number [{variable.unit or '1'}]",
-                fix="give a number",
-            )
-        return value
 
     def _unknown(self, name: str, valid: Sequence[str] = ()) -> FmuError:
         near = nearest_name(name, valid or self.variables)
@@ -405,21 +273,16 @@ class Fmu(Closing):
 
     def step_failure(self, t: float, status: int) -> StepError:
         """Returns the error for a step from t [s] that returned `status`."""
-        message, reached = self._last_message(status), self._reached(status)
+        message, reached = self._last_message(status), math.nan
+        if STATUS[status] == "discard":
+            with suppress(Exception):  # fmpy's own error type: the FMU does not report the time
+                reached = float(self._slave.getRealStatus(LAST_SUCCESSFUL_TIME))
         return StepError(
             f"the FMU {STATUS[status]}s the step from {t:.6g} s",
             reached=reached,
             got=message,
             where=self.path.name,
         )
-
-    def _reached(self, status: int) -> float:
-        if STATUS[status] != "discard":
-            return math.nan
-        try:
-            return float(self._slave.getRealStatus(LAST_SUCCESSFUL_TIME))
-        except Exception:  # fmpy's own error type: the FMU does not report the time
-            return math.nan
 
     def close(self) -> None:
         """Frees the instance and deletes the unpacked files; may be called twice."""

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.master.recorder import ColumnError
 from hexapod_cosim.cosim.results.metrics import foot_errors
+from hexapod_cosim.cosim.results.support import body_height
 from hexapod_cosim.cosim.results.window import (
     View,
     bearing_load,
-    body_height,
     robot_weight,
     running_integral,
     slip_under_load,

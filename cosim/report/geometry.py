@@ -1,24 +1,44 @@
-"""Describes the robot and the ground of a run for the viewer, from the FMU's parameters."""
+"""Describes robot and ground of a run for the viewer, from the FMU's parameters and the surface.
+
+Heights of a surface are in 16-bit steps, materials bytes. A height is reproduced within
+range/131070: 4 um for a surface whose heights differ by half a metre.
+"""
 
 from __future__ import annotations
 
+import base64
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.export.picture import COLOURS, THICKNESS
 from hexapod_cosim.cosim.interface.names import vector_names
+from hexapod_cosim.cosim.report.packing import STEPS
 from hexapod_cosim.cosim.results.folder import StoredResult
-from hexapod_cosim.cosim.results.window import FLAT, SLOPE
+from hexapod_cosim.cosim.results.footprints import Footprint
+from hexapod_cosim.cosim.results.support import FLAT, SLOPE
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot
+from hexapod_cosim.models.ground.faces import surface_heights
+from hexapod_cosim.models.ground.patches import PROPERTIES
+from hexapod_cosim.models.ground.smooth import RUN_OUT
+from hexapod_cosim.models.ground.surface import LAW, MU, Surface
+from hexapod_cosim.models.ground.table import CATALOGUE
 from hexapod_cosim.models.schema import parse_toml
+from hexapod_cosim.models.soil.presets import list_soils, soil_preset
 
 Parameters = Mapping[str, float]
+Array = NDArray[np.float64]
 
 FLATNESS = 0.25  # height of a torso of unknown size, relative to the width between its hips
+FINE = 0.0125  # m    spacing of the samples of a smooth surface, if it is not too large for it
+MOST_NODES = 250_000  # of a drawn surface; a finer one is drawn with every second, third ... node
+SOIL, SLIPPERY, PATCH = "soil", "slippery", "patch"  # what a material is drawn as
+UNITS = {"mu": "", "mu_static": "", "stiffness": " N/m^1.5"}
 
 
 def describe_robot(run: StoredResult) -> dict[str, Any]:
@@ -83,3 +103,133 @@ def describe_ground(parameters: Parameters) -> dict[str, float]:
 
 def _vector(parameters: Parameters, stem: str) -> list[float]:
     return [parameters[name] for name in vector_names(stem)]
+
+
+def pack_surface(surface: Surface, parameters: Mapping[str, float]) -> dict[str, Any]:
+    """Returns a surface for the viewer (scene/surface.ts): its grid, heights and materials.
+
+    A smooth surface is sampled finely, with the run-out of its slope beyond the border, so that the
+    viewer needs no law of its own between samples. Heights are steps of `step` [m] above `low` [m]:
+    row by row, as differences of differences along both axes modulo 2^16, all low bytes before all
+    high bytes, deflated.
+    """
+    x, y, height, material = _sampled(surface)
+    low, step = float(height.min()), float(np.ptp(height)) / STEPS
+    steps = np.round((height - low) / (step or 1.0)).astype(np.uint16)
+    return {
+        "kind": surface.kind,
+        "name": str(surface.recipe.get("kind", surface.name)),
+        "rows": height.shape[0],
+        "columns": height.shape[1],
+        "x0": float(x[0]),
+        "y0": float(y[0]),
+        "cell": float(x[1] - x[0]),
+        "low": low,
+        "step": step,
+        "data": _deflated_steps(steps),
+        "materials": material_legend(surface, parameters),
+        "material": "" if material is None else _deflated(material),
+    }
+
+
+def _sampled(surface: Surface) -> tuple[Array, Array, Array, NDArray[np.uint8] | None]:
+    """Returns x (columns,), y (rows,), heights (rows, columns) [m] and materials of a grid."""
+    every, parts, margin = stride(surface), 1, 0
+    if surface.kind == "smooth" and every == 1:
+        most = math.isqrt(MOST_NODES // surface.height.size)
+        parts = max(min(round(surface.cell / FINE), most), 1)
+        margin = math.ceil(RUN_OUT * parts / surface.cell)
+    along = [
+        np.arange(-margin, (count - 1) * parts + margin + 1, every)
+        for count in (surface.columns, surface.rows)
+    ]
+    x = surface.x0 + along[0] * surface.cell / parts
+    y = surface.y0 + along[1] * surface.cell / parts
+    columns, rows = (
+        np.clip(np.round(each / parts).astype(int), 0, count - 1)
+        for each, count in zip(along, (surface.columns, surface.rows), strict=True)
+    )
+    nodes = np.ix_(rows, columns)
+    height = surface.height[nodes] if parts == 1 and not margin else surface_heights(surface, x, y)
+    return x, y, height, None if surface.material is None else surface.material[nodes]
+
+
+def pack_footprints(footprints: Iterable[Footprint]) -> list[list[float]]:
+    """Returns begin, end [s], x, y, depth and radius [m] of footprints for the viewer.
+
+    The end of those that stay is 0.
+    """
+    return [
+        [
+            round(one.begin, 6),
+            round(one.end, 6) if math.isfinite(one.end) else 0.0,
+            round(one.x, 5),
+            round(one.y, 5),
+            round(one.depth, 6),
+            one.radius,
+        ]
+        for one in footprints
+    ]
+
+
+def stride(surface: Surface) -> int:
+    """Returns how many nodes of a surface one drawn node stands for, along each axis."""
+    return max(int(np.ceil(np.sqrt(surface.height.size / MOST_NODES))), 1)
+
+
+def _deflated_steps(steps: NDArray[np.uint16]) -> str:
+    """Deflates heights; a plane and a step along an axis become almost only zeros."""
+    for axis in (0, 1):
+        edge = np.zeros_like(steps.take([0], axis=axis))
+        steps = np.diff(steps, axis=axis, prepend=edge)
+    planes = steps.astype("<u2").reshape(-1).view(np.uint8).reshape(-1, 2).T
+    return _deflated(np.ascontiguousarray(planes))
+
+
+def _deflated(content: NDArray[np.uint8]) -> str:
+    return base64.b64encode(zlib.compress(content.tobytes(), 9)).decode("ascii")
+
+
+def material_legend(surface: Surface, parameters: Mapping[str, float]) -> list[dict[str, str]]:
+    """Returns what each material from 1 on is drawn as, and its text for the legend."""
+    if surface.materials is None:
+        return []
+    names = _soil_names(surface)
+    return [
+        {"look": _look(row, parameters), "text": _describe(row, name)}
+        for row, name in zip(surface.materials, names, strict=True)
+    ]
+
+
+def _soil_names(surface: Surface) -> list[str]:
+    """Returns the soil of each material as the recipe has it, "" where none is known."""
+    count = 0 if surface.materials is None else len(surface.materials)
+    recipe = surface.recipe
+    entry = CATALOGUE.get(str(recipe.get("kind", "")))
+    names = []
+    if entry is not None and "soil" in entry.parameters:
+        names = [str(recipe.get("soil", entry.parameters["soil"].default))]
+    names += [str(patch.get("soil", "")) for patch in recipe.get("patch", ())]
+    return names if len(names) == count else [""] * count
+
+
+def _look(row: NDArray[np.float64], parameters: Mapping[str, float]) -> str:
+    if row[LAW] > 0.0:
+        return SOIL
+    return SLIPPERY if row[MU] < parameters.get("friction.mu", 0.0) else PATCH
+
+
+def _describe(row: NDArray[np.float64], soil: str) -> str:
+    """Returns the properties of a material that differ from the ground of the definition."""
+    parts = [
+        f"{key} {row[column]:.3g}{UNITS[key]}"
+        for key, column in PROPERTIES.items()
+        if np.isfinite(row[column])
+    ]
+    if row[LAW] > 0.0:
+        parts.insert(0, _soil_title(soil))
+    return ", ".join(parts)
+
+
+def _soil_title(soil: str) -> str:
+    return soil_preset(soil).title if soil in list_soils() else soil or "soft ground"

@@ -12,7 +12,7 @@ import numpy as np
 from hexapod_cosim.cosim.results.comparison import BETTER, WORSE, Change, Comparison
 from hexapod_cosim.cosim.results.drop import Drop
 from hexapod_cosim.cosim.results.facts import RunFacts
-from hexapod_cosim.cosim.results.metrics import METRICS, PER_RADIAN
+from hexapod_cosim.cosim.results.metric_table import METRICS, PER_RADIAN
 from hexapod_cosim.cosim.results.window import TANH
 from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.models.ground.surface import LAW, Surface

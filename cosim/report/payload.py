@@ -10,9 +10,14 @@ from typing import Any
 from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.master.recorder import ColumnError
 from hexapod_cosim.cosim.report.columns import MOST_ROWS, Chosen, choose
-from hexapod_cosim.cosim.report.geometry import describe_ground, describe_robot
+from hexapod_cosim.cosim.report.geometry import (
+    describe_ground,
+    describe_robot,
+    pack_footprints,
+    pack_surface,
+    stride,
+)
 from hexapod_cosim.cosim.report.packing import pack
-from hexapod_cosim.cosim.report.surface import pack_footprints, pack_surface, stride
 from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.footprints import find_footprints
 from hexapod_cosim.cosim.results.window import CONTACT_SHARE

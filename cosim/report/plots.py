@@ -15,12 +15,11 @@ from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.master.recorder import ColumnError
 from hexapod_cosim.cosim.report.profile import make_profile
 from hexapod_cosim.cosim.results.metrics import planned_feet, plans_feet
+from hexapod_cosim.cosim.results.support import body_height, real_feet
 from hexapod_cosim.cosim.results.window import (
     Array,
     View,
-    body_height,
     commanded_path,
-    real_feet,
     robot_weight,
     running_integral,
     slip_under_load,

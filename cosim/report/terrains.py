@@ -14,11 +14,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED, WIDTH
+from hexapod_cosim.controller.figure_style import SETTINGS, WIDTH
 from hexapod_cosim.cosim.common.control_style import control_styles
-from hexapod_cosim.cosim.common.files import atomic_path, atomic_text
+from hexapod_cosim.cosim.common.files import atomic_text
+from hexapod_cosim.cosim.report.figures import Figures, figure_files, write_figures
+from hexapod_cosim.cosim.results.side_by_side import Comparisons
 from hexapod_cosim.cosim.results.summary import Summary
-from hexapod_cosim.cosim.results.uncertainty import Comparisons
 
 TABLE, FIGURE = "terrains.csv", "terrains"
 LARGEST, SMALLER = 7.0, 0.75  # size of the first control's mark, and share of each next one's
@@ -110,12 +111,8 @@ def write_terrains(rows: list[Row], folder: Path) -> list[Path]:
         for row in table:
             writer.writerow({name: _cell(value) for name, value in row.items()})
     with matplotlib.rc_context(SETTINGS):
-        figure = draw_terrains(rows)
-        for kind, metadata in UNDATED.items():
-            files.append(folder / f"{FIGURE}.{kind}")
-            with atomic_path(files[-1]) as temporary:
-                figure.savefig(temporary, format=kind, dpi=DPI, metadata=metadata)
-    return files
+        images = {f"{FIGURE}.{kind}": image for kind, image in figure_files(draw_terrains(rows))}
+    return files + write_figures(Figures(images, {}), folder)
 
 
 def _cell(value: Any) -> Any:

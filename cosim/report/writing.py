@@ -13,33 +13,30 @@ from markupsafe import Markup
 
 from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.common.files import without_none, write_text
-from hexapod_cosim.cosim.report.accuracy import (
-    Metrics,
-    Rows,
-    about_accuracy,
-    effect_rows,
-    with_errors,
-)
 from hexapod_cosim.cosim.report.figures import Figures, draw_figures, write_figures
+from hexapod_cosim.cosim.report.geometry import material_legend
 from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
 from hexapod_cosim.cosim.report.page import NO_VIEWER, embedded, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json, make_payload
-from hexapod_cosim.cosim.report.servos import servo_rows
-from hexapod_cosim.cosim.report.surface import material_legend
+from hexapod_cosim.cosim.report.tables import (
+    Metrics,
+    Rows,
+    about,
+    about_accuracy,
+    comparison_rows,
+    effect_rows,
+    metric_rows,
+    servo_rows,
+    with_errors,
+)
 from hexapod_cosim.cosim.results.accuracy import Accuracy
-from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change
+from hexapod_cosim.cosim.results.comparison import METHOD
 from hexapod_cosim.cosim.results.facts import RunFacts
 from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.ground import describe_terrain
-from hexapod_cosim.cosim.results.metrics import (
-    DUST,
-    FLOORS,
-    METRICS,
-    has_net_slip,
-    plans_feet,
-    shown_metrics,
-)
-from hexapod_cosim.cosim.results.uncertainty import Comparisons
+from hexapod_cosim.cosim.results.metric_table import has_net_slip
+from hexapod_cosim.cosim.results.metrics import plans_feet
+from hexapod_cosim.cosim.results.side_by_side import Comparisons
 from hexapod_cosim.models import JOINT_NAMES
 
 REPORT, PLOTS, PROFILE = "report.html", "plots", "profile"
@@ -291,102 +288,3 @@ def _walked(facts: RunFacts) -> str:
 def _robot(facts: RunFacts) -> str:
     drop = f" {facts.drop.text}" if facts.drop else ""
     return f"Robot {facts.robot.name}, {_duration(facts)}.{drop}"
-
-
-def metric_rows(metrics: Metrics, *, net_slip: bool) -> Rows:
-    """Returns a row per metric that the runs have: name, unit, meaning and values as texts.
-
-    metrics: by control.
-    """
-    empty: dict[str, Any] = {"change": "", "interval": "", "verdict": "", "changes": []}
-    shown = [(name, *METRICS[name]) for name in shown_metrics(metrics, net_slip=net_slip)]
-    return [
-        {
-            "name": name,
-            "unit": unit,
-            "meaning": meaning,
-            "values": [_shown(name, run.get(name)) for run in metrics.values()],
-        }
-        | empty
-        for name, unit, _, meaning in shown
-    ]
-
-
-def comparison_rows(comparison: Comparisons, *, net_slip: bool = False) -> Rows:
-    """Returns the rows of the means, with the changes from the reference of each other control.
-
-    `changes` of a row has an entry for each pair; `change`, `interval` and `verdict` are those of
-    the first entry. Over several seeds, the first row tells how many runs walked to the end.
-    """
-    rows = metric_rows(comparison.means, net_slip=net_slip)
-    for row in rows:
-        changes = [_shown_change(pair.changes[row["name"]]) for pair in comparison.pairs]
-        row |= {**changes[0], "changes": changes}
-    count, walked = len(comparison.seeds), comparison.walked
-    if count == 1:
-        return rows
-    counted = [
-        {"change": "", "interval": "", "verdict": _more(*(walked[label] for label in pair.labels))}
-        for pair in comparison.pairs
-    ]
-    first = {
-        "name": "walked",
-        "unit": "runs",
-        "meaning": "runs in which the robot walked upright to the end and arrived",
-        "values": [f"{number} of {count}" for number in walked.values()],
-        **counted[0],
-        "changes": counted,
-    }
-    return [first, *rows]
-
-
-def _shown_change(change: Change) -> dict[str, str]:
-    return {"change": _change(change), "interval": _interval(change), "verdict": change.verdict}
-
-
-def _more(before: int, after: int) -> str:
-    """Returns the verdict on a number of walks."""
-    return SAME if before == after else BETTER if after > before else WORSE
-
-
-def about(comparison: Comparisons) -> str:
-    """Returns a sentence on what the table's values are; "" for a single seed."""
-    seeds, n = comparison.seeds, len(comparison.seeds)
-    if n == 1:
-        return ""
-    if len(comparison.pairs) > 1:
-        return (
-            f"Means over those of {n} seeds ({seeds[0]} to {seeds[-1]}) on which the control "
-            f"walked to the end; changes are over the pairs in which both walked; {METHOD}."
-        )
-    judged = max(change.pairs for change in comparison.pairs[0].changes.values())
-    part = f" of the {judged} in which both walked to the end" if judged < n else ""
-    return (
-        f"Means over {n} seeds ({seeds[0]} to {seeds[-1]}){part}, both controls on each; {METHOD}."
-    )
-
-
-def _shown(name: str, value: float | None) -> str:
-    return number(value, dust=DUST * FLOORS[name])
-
-
-def number(value: float | None, *, dust: float = 0.0) -> str:
-    """Returns a value as text with four digits; one smaller than `dust` is 0."""
-    if value is not None and abs(value) < dust:
-        return "0"
-    return "-" if value is None or not math.isfinite(value) else f"{value:.4g}"
-
-
-def _change(change: Change) -> str:
-    """Returns the relative change; "" near the floor and for a single pair without a verdict."""
-    known = math.isfinite(change.relative) and (change.pairs > 1 or change.verdict != SAME)
-    return _share(change.relative) if known else ""
-
-
-def _interval(change: Change) -> str:
-    low, high = change.interval
-    return f"{_share(low).removesuffix(' %')} to {_share(high)}" if math.isfinite(low) else ""
-
-
-def _share(value: float) -> str:
-    return f"{100.0 * value:+.1f} %"

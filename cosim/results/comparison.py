@@ -20,24 +20,20 @@ The runs of a comparison are stored in seeds.csv.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.common.files import atomic_text
-from hexapod_cosim.cosim.results.metrics import FLOORS, METRICS
+from hexapod_cosim.cosim.results.metric_table import FLOORS, METRICS
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.models import HexapodError
 
 Array = NDArray[np.float64]
 
-SEEDS, SEEDS_PARTIAL = "seeds.csv", "seeds.partial.csv"
 CONFIDENCE = 0.95
 BETTER, WORSE, SAME = "better", "worse", "same"
 LARGEST = 700.0  # logarithm whose exponential is finite
@@ -46,8 +42,6 @@ METHOD = (
     "(Student's, of its logarithm), so none is below -100 %"
 )
 LEAST_CHANGE = 0.005  # relative; a smaller change of a single pair is neither better nor worse
-FACTS = tuple(item.name for item in fields(Summary) if item.name != "metrics")
-SEPARATOR = " | "  # between the warnings of a run in one cell
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -269,65 +263,3 @@ def verdicts(
     )
     none = np.isnan(difference) | (less_is_better is None)
     return np.select([none, same, (difference < 0.0) == less_is_better], ["", SAME, BETTER], WORSE)
-
-
-def write_seeds(path: Path, runs: Sequence[Summary]) -> None:
-    """Writes seeds.csv, one line per run with its facts and metrics. The file is never partial."""
-    with atomic_text(path) as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*FACTS, *METRICS])
-        for run in runs:
-            facts = [_cell(getattr(run, name)) for name in FACTS]
-            writer.writerow([*facts, *(_cell(run.metrics[name]) for name in METRICS)])
-
-
-def _cell(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return SEPARATOR.join(value)
-    return "" if isinstance(value, float) and math.isnan(value) else value
-
-
-def read_seeds(path: Path) -> dict[str, list[Summary]]:
-    """Reads the runs of seeds.csv, by control. Raises HexapodError for a damaged file."""
-    fix = "run `hexapod compare` again"
-    runs: dict[str, list[Summary]] = {}
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            for row in csv.DictReader(file):
-                runs.setdefault(row["control"], []).append(_summary(row))
-    except OSError as error:
-        raise HexapodError(
-            "no runs by seed",
-            got=error.strerror,
-            expected=f"{SEEDS} of a comparison",
-            fix=fix,
-            where=str(path),
-        ) from error
-    except (KeyError, TypeError, ValueError, csv.Error) as error:
-        expected = "a line per run, with all metrics"
-        raise HexapodError(
-            "damaged file",
-            got=f"{type(error).__name__}: {error}",
-            expected=expected,
-            fix=fix,
-            where=str(path),
-        ) from error
-    return runs
-
-
-def _summary(row: Mapping[str, str]) -> Summary:
-    return Summary(
-        control=row["control"],
-        seed=int(row["seed"]),
-        status=row["status"],
-        reason=row["reason"],
-        upright=row["upright"] == str(True),
-        fallback=_number(row["fallback"]) if row["fallback"] else None,
-        warnings=tuple(filter(None, row["warnings"].split(SEPARATOR))),
-        missed=row["missed"],
-        metrics={name: _number(row[name]) for name in METRICS},
-    )
-
-
-def _number(text: str) -> float:
-    return float(text) if text else math.nan

@@ -7,9 +7,17 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
+from hexapod_cosim.cosim.master.loop import COMPLETED, Outcome
+from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.drop import Bounce, Drop
-from hexapod_cosim.cosim.results.gait_choice import GaitChoice
+from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models.ground.surface import Surface
+
+MAIN = ("slip_per_metre", "peak_force", "path_error", "cost_of_transport")  # of a repr
+
+OF_FMU = "controller FMU"  # a stance that is read from such an FMU
+LEAST_LENGTH = 5e-4  # m    a smaller change of the stance is not named
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,3 +120,98 @@ def _drop(table: Mapping[str, Any] | None) -> Drop | None:
 def _number(value: float | None) -> float:
     """Returns a number of a JSON file, where null stands for NaN."""
     return math.nan if value is None else float(value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """A run's scenario, outcome, metrics and facts."""
+
+    scenario: Scenario
+    outcome: Outcome
+    metrics: Mapping[str, float]
+    facts: RunFacts
+    surface: Surface | None = None  # that the FMU read from its resources; None: a plane
+
+    def __repr__(self) -> str:
+        """Returns title, control, status, simulated time and the main metrics that there are."""
+        outcome = self.outcome
+        found = {name: self.metrics.get(name, math.nan) for name in MAIN}
+        figures = [f"{name}={value:.4g}" for name, value in found.items() if math.isfinite(value)]
+        parts = [
+            f"{self.scenario.title!r}",
+            f"control={self.facts.control!r}",
+            f"status={outcome.status!r}",
+            f"simulated={outcome.simulated:.4g}",
+            *figures,
+        ]
+        return f"Result({', '.join(parts)})"
+
+    @property
+    def recording(self) -> Recording:
+        """The recorded rows: time, the plant's outputs and inputs, commands."""
+        return self.outcome.recording
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """The FMU's parameters during the run."""
+        return self.facts.parameters
+
+    @property
+    def completed(self) -> bool:
+        """Whether the run reached its end."""
+        return self.outcome.status == COMPLETED
+
+
+@dataclass(frozen=True, kw_only=True)
+class GaitChoice:
+    """Gait and stance of a run."""
+
+    gait: str
+    period: float  # s
+    duty: float  # 1
+    stance: str  # its name, or OF_FMU
+    outward: float  # m    by which the feet stand further out from the hips than the robot's
+    deeper: float  # m    and deeper below them
+    narrowing: float  # m    by which the feet are set nearer together at speed
+    chosen_by: str  # scenario, control or robot file
+
+    @property
+    def brief(self) -> str:
+        """Gait and stance."""
+        return f"{self.gait}, period {self.period:.3g} s, {self._feet()}"
+
+    @property
+    def text(self) -> str:
+        """Gait and stance, and whose choice they were."""
+        return f"{self.brief}, chosen by the {self.chosen_by}"
+
+    def _feet(self) -> str:
+        """Returns the stance against the robot file's, or that it is a controller FMU's."""
+        if self.stance == OF_FMU:
+            return f"the stance of the {OF_FMU}"
+        changes = (
+            (self.outward, "further out from the hips", "nearer to the hips"),
+            (self.deeper, "deeper below them", "less deep below them"),
+        )
+        parts = [
+            f"{1e3 * abs(length):.0f} mm {more if length > 0.0 else less}"
+            for length, more, less in changes
+            if abs(length) > LEAST_LENGTH
+        ]
+        return f"feet {' and '.join(parts)}" if parts else "the robot file's stance"
+
+
+def gait_differences(choices: Mapping[str, GaitChoice]) -> list[str]:
+    """Returns a sentence for each gait and stance, with its controls, if there are several.
+
+    choices: by the labels of the controls.
+    """
+    groups: dict[str, list[str]] = {}
+    for label, choice in choices.items():
+        groups.setdefault(choice.brief, []).append(label)
+    if len(groups) < 2:
+        return []
+    return [
+        f"{', '.join(labels)} {'walks' if len(labels) == 1 else 'walk'} {choices[labels[0]].text}"
+        for labels in groups.values()
+    ]

@@ -19,11 +19,11 @@ from hexapod_cosim.cosim.common.files import (
     write_json,
     write_text,
 )
-from hexapod_cosim.cosim.common.locks import lock_folder
+from hexapod_cosim.cosim.common.temporary import lock_folder
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED
 from hexapod_cosim.cosim.results.accuracy import Accuracy, accuracy_from_table
-from hexapod_cosim.cosim.results.facts import RunFacts, facts_from_table
+from hexapod_cosim.cosim.results.facts import Result, RunFacts, facts_from_table
 from hexapod_cosim.cosim.results.ground import around_walk, read_ground, write_ground
 from hexapod_cosim.cosim.results.recordings import (
     COMMANDS,
@@ -31,7 +31,6 @@ from hexapod_cosim.cosim.results.recordings import (
     write_commands,
     write_recording,
 )
-from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.models import HexapodError
 from hexapod_cosim.models.files import read_text

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.results.window import FLAT, GRID
+from hexapod_cosim.cosim.results.support import FLAT, GRID
 from hexapod_cosim.models.ground.faces import ground_height
 from hexapod_cosim.models.ground.grid_file import read_grid, surface_from_bytes, write_grid
 from hexapod_cosim.models.ground.surface import Surface

@@ -6,15 +6,21 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from hexapod_cosim.cosim.master.loop import COMPLETED
-from hexapod_cosim.cosim.results.metrics import METRICS
-from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.facts import Result
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError
 
 REFUSED = "refused"  # a status besides those of the master: the run did not start
 NO_FIGURES = dict.fromkeys(METRICS, math.nan)
+
+UNBALANCED = 0.01  # share of the motors' work; a larger energy residual causes a warning
+FIX = "tighten solver.tolerance or, with a fixed step, shorten solver.step"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,3 +86,31 @@ def refused_summary(scenario: Scenario, error: HexapodError) -> Summary:
         reason=str(error),
         metrics=NO_FIGURES,
     )
+
+
+@dataclass(frozen=True)
+class Unbalanced:
+    """The runs whose energy residual is larger than UNBALANCED."""
+
+    count: int = 0
+    largest: float = 0.0  # residual over the motors' work
+
+    @classmethod
+    def among(cls, residuals: ArrayLike) -> Unbalanced:
+        """Returns those among runs with these residuals, NaN for runs without metrics."""
+        values = np.asarray(residuals, dtype=np.float64)
+        above = values[values > UNBALANCED]
+        return cls(above.size, float(above.max(initial=0.0)))
+
+    def warnings(self, control: str, *, runs: int) -> list[str]:
+        """Returns one warning for all runs under a control, or none.
+
+        Args:
+            control: of the runs.
+            runs: number of runs, balanced ones included.
+        """
+        text = (
+            f"{control}: the energy balance of {self.count} of {runs} runs misses more than "
+            f"{100.0 * UNBALANCED:g} %, at most {100.0 * self.largest:.3g} %: {FIX}"
+        )
+        return [text] if self.count else []

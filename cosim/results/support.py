@@ -1,4 +1,5 @@
-"""Computes the stability margin: the centre of mass over the support polygon of the standing feet.
+"""Computes from joint angles where feet and centre of mass are, and the stability margin: the
+centre of mass over the support polygon of the standing feet.
 
 All rows of a recording are computed at once.
 """
@@ -13,13 +14,14 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.results.feet import moment_of_leg
-from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, TERRAINS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 ROWS_AT_ONCE = 4096  # bounds the memory of the pairs of feet
 COINCIDENT = 1e-9  # m    feet closer than this make no edge
+# numbers of the FMU's enumerations
+FLAT, SLOPE, GRID = (TERRAINS.index(kind) + 1 for kind in ("flat", "slope", "grid"))
 
 
 def stability_margins(recording: Recording, parameters: Mapping[str, float]) -> Array:
@@ -119,3 +121,128 @@ def rotation_matrices(quaternion: Array) -> Array:
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
     return np.array(rows)
+
+
+def feet_of_angles(part: Recording, parameters: Mapping[str, float]) -> Array:
+    """Returns the centres of the feet in the torso's frame [m] (rows, 6, 3) from joint angles.
+
+    They do not depend on the ground. parameters: of the FMU, with the geometry of the legs.
+    """
+    angle = part.columns(joint_names("angle")).reshape(-1, len(LEG_NAMES), len(JOINT_NAMES))
+    legs = [_centre(leg, angle[:, k], parameters) for k, leg in enumerate(LEG_NAMES)]
+    return np.stack(legs, axis=1)
+
+
+def _centre(leg: str, angle: Array, parameters: Mapping[str, float]) -> Array:
+    """Returns the centre of one foot (rows, 3), by angles (rows, 3) of its joints [rad]."""
+    place = np.zeros((len(angle), 3))
+    for joint, name in reversed(list(enumerate(JOINT_NAMES))):
+        link = f"{leg}.{name}"
+        place = turned(place + _tip(link, parameters), _axis(link, parameters), angle[:, joint])
+    return _hip(leg, parameters) + _turned_by_hip(leg, place, parameters)
+
+
+def moment_of_leg(leg: str, angle: Array, parameters: Mapping[str, float]) -> tuple[float, Array]:
+    """Returns the mass of a leg [kg] and its first moment [kg m] (rows, 3) in the torso's frame.
+
+    angle: (rows, 3) of its joints [rad].
+    """
+    borne, moment = 0.0, np.zeros((len(angle), 3))  # of the links from this joint on, about it
+    for joint, name in reversed(list(enumerate(JOINT_NAMES))):
+        link = f"{leg}.{name}"
+        mass = parameters[f"{link}.mass"]
+        com = np.array([parameters[key] for key in vector_names(f"{link}.com")])
+        moment = moment + mass * com + borne * _tip(link, parameters)
+        moment = turned(moment, _axis(link, parameters), angle[:, joint])
+        borne += mass
+    return borne, borne * _hip(leg, parameters) + _turned_by_hip(leg, moment, parameters)
+
+
+def _tip(link: str, parameters: Mapping[str, float]) -> Array:
+    return np.array([parameters[f"{link}.{key}"] for key in ("length", "offset_y", "offset_z")])
+
+
+def _axis(link: str, parameters: Mapping[str, float]) -> Array:
+    axis = np.array([parameters[key] for key in vector_names(f"{link}.axis")])
+    return np.asarray(axis / np.linalg.norm(axis))
+
+
+def _hip(leg: str, parameters: Mapping[str, float]) -> Array:
+    return np.array([parameters[key] for key in vector_names(f"{leg}.hip_position")])
+
+
+def _turned_by_hip(leg: str, vector: Array, parameters: Mapping[str, float]) -> Array:
+    yaw = np.full(len(vector), parameters[f"{leg}.hip_yaw"])
+    return turned(vector, np.array([0.0, 0.0, 1.0]), yaw)
+
+
+def turned(vector: Array, axis: Array, angle: Array) -> Array:
+    """Returns vectors (rows, 3) turned about a unit axis (3,) by angles (rows,) [rad]."""
+    cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    along = (vector @ axis)[:, None] * axis
+    return np.asarray(along + cosine * (vector - along) + sine * np.cross(axis, vector))
+
+
+def body_height(part: Recording, parameters: Mapping[str, float]) -> Array:
+    """Returns the height of the torso above the ground along z [m] (rows,).
+
+    The ground of a surface is the mean height of the feet in contact, of the last ones while there
+    are none. Its height below the torso would jump at each stone and gap.
+    """
+    x, y, z = part.vector("torso.position").T
+    if parameters.get("terrain.kind", FLAT) == GRID:
+        return np.asarray(z - _feet_level(part, parameters))
+    heading = parameters.get("terrain.heading", 0.0)
+    rise = x * np.cos(heading) + y * np.sin(heading)
+    ground: Array = parameters.get("terrain.height", 0.0) + np.tan(_incline(parameters)) * rise
+    return np.asarray(z - ground)
+
+
+def _feet_level(part: Recording, parameters: Mapping[str, float]) -> Array:
+    """Returns the mean height of the contact points of feet in contact [m] (rows,).
+
+    Rows without a contact have the value of the last row with one; before the first contact it is
+    `terrain.height`.
+    """
+    in_contact = part.feet("contact") > 0.5
+    count = in_contact.sum(axis=1)
+    height = np.where(in_contact, part.foot_vectors("position")[:, :, 2], 0.0).sum(axis=1)
+    level = height / np.maximum(count, 1)
+    latest = np.maximum.accumulate(np.where(count > 0, np.arange(len(count)), -1))
+    before = parameters.get("terrain.height", 0.0)
+    return np.where(latest >= 0, level[np.maximum(latest, 0)], before)
+
+
+def ground_normal(parameters: Mapping[str, float]) -> Array:
+    """Returns the ground's upward normal (3,), world axes; that of a surface is the vertical."""
+    heading, incline = parameters.get("terrain.heading", 0.0), _incline(parameters)
+    sine = np.sin(incline)
+    return np.array([-sine * np.cos(heading), -sine * np.sin(heading), np.cos(incline)])
+
+
+def _incline(parameters: Mapping[str, float]) -> float:
+    """Returns the incline of the ground [rad], which is 0 for all but slopes."""
+    slope = parameters.get("terrain.kind", FLAT) == SLOPE
+    return float(parameters.get("terrain.incline", 0.0)) if slope else 0.0
+
+
+def real_feet(recording: Recording, parameters: Mapping[str, float]) -> Array:
+    """Returns the centres of the feet in the torso's frame [m] (rows, 6, 3).
+
+    On a plane they are a radius above the contact points, along the normal. On a surface, whose
+    normal depends on the place, they follow from the joint angles.
+    """
+    if parameters.get("terrain.kind", FLAT) == GRID:
+        return feet_of_angles(recording, parameters)
+    turn = rotation_matrices(recording.vector("torso.quaternion", 4))
+    centres = recording.foot_vectors("position") + parameters["foot.radius"] * ground_normal(
+        parameters
+    )
+    arms = centres - recording.vector("torso.position")[:, None, :]
+    com = np.array([parameters[name] for name in vector_names("torso.com")])
+    along = arms.transpose(2, 1, 0)  # (3, 6, rows)
+    seen = [
+        turn[0, i] * along[0] + turn[1, i] * along[1] + turn[2, i] * along[2] + com[i]
+        for i in range(3)
+    ]
+    return np.array(seen).transpose(2, 1, 0)

@@ -1,16 +1,5 @@
-"""Warnings about a run: falls, settings without effect, a controller that gave up feedback.
-
-A robot has fallen when
-
-- its torso leans by UPRIGHT or more against the ground's normal, at any time after the first foot
-  contact; or
-- its torso is lower than SUNK of the expected height for SUNK_TIME or until the run ends. The
-  expected height is the height at the first foot contact plus the commanded change of height; or
-- its torso is lower than half its own thickness, at any time: then it lies on the ground.
-
-Heights are above the ground; on a surface, above the level of the feet that touch it, and the
-normal is the vertical. So a robot that starts in the air has not fallen unless it lands
-badly.
+"""Warnings about a run: settings without effect, a controller that gave up feedback, weak friction,
+servos, legs that overlap and missing energy.
 """
 
 from __future__ import annotations
@@ -19,51 +8,20 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.results.balance import run_balance_warnings
-from hexapod_cosim.cosim.results.facts import Locomotion
 from hexapod_cosim.cosim.results.footprints import sinkage_warnings
-from hexapod_cosim.cosim.results.window import LEAST_DISTANCE, SKIPPED_CYCLES, View, body_height
+from hexapod_cosim.cosim.results.locomotion import fallback_columns
+from hexapod_cosim.cosim.results.summary import FIX, Unbalanced
+from hexapod_cosim.cosim.results.support import ground_normal
+from hexapod_cosim.cosim.results.window import LEAST_DISTANCE, SKIPPED_CYCLES, View
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, TERRAINS, Robot, Terrain
+from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, Robot
 from hexapod_cosim.models.friction import BRISTLE_LAWS
-from hexapod_cosim.models.ground.faces import ground_normal
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import SELF_CONTACTS
+from hexapod_cosim.models.records import SELF_CONTACTS, Servo
 from hexapod_cosim.models.statics import sliding
-
-UPRIGHT = 0.6  # rad
-SUNK = 0.5  # 1
-SUNK_TIME = 0.5  # s    longer than the legs stay bent after a landing
-
-
-def locomotion_of(view: View, *, upright: bool, missed: str = "") -> Locomotion:
-    """Returns how the robot got ahead.
-
-    upright: whether it stayed so; missed: how it missed the end of its path, "" if it arrived.
-    """
-    window = view.window
-    distance = window.distance if window else math.nan
-    lasted = float(window.recording.time[-1] - window.recording.time[0]) if window else math.nan
-    fallen_back = fallback_columns(view.recording)
-    return Locomotion(
-        distance=distance,
-        mean_speed=distance / lasted,
-        upright=upright,
-        fallback=float(np.mean(fallen_back.any(axis=1))) if len(fallen_back) else None,
-        missed=missed,
-    )
-
-
-def fallback_columns(recording: Recording) -> NDArray[np.bool_]:
-    """Returns when each leg walked without feedback (rows, 6); no rows when not reported."""
-    names = [f"controller.{leg}.fallback" for leg in LEG_NAMES]
-    if not set(names) <= set(recording.names):
-        return np.zeros((0, len(LEG_NAMES)), dtype=np.bool_)
-    return recording.columns(names) > 0.5
 
 
 def fallback_warnings(recording: Recording) -> list[str]:
@@ -89,62 +47,13 @@ def fallback_warnings(recording: Recording) -> list[str]:
     return [slid, *found] if together else found
 
 
-def describe_fall(view: View, robot: Robot) -> str:
-    """Returns when and how the robot fell, as the module defines a fall; "" when it did not."""
-    recording = view.recording
-    landed = np.flatnonzero((recording.feet("contact") > 0.5).any(axis=1))
-    begin = int(landed[0]) if len(landed) else len(recording.time)
-    on_ground = np.arange(len(recording.time)) >= begin
-    height = body_height(recording, view.parameters)
-    wanted = recording.column("command.height") + (height[begin] if len(landed) else 0.0)
-    lying = height < 0.5 * robot.torso.size[2]
-    leaning = on_ground & (_lean(recording, view.parameters) >= UPRIGHT)
-    sunk = _lasting(recording.time, on_ground & (height < SUNK * wanted))
-    fallen = lying | leaning | sunk
-    if not fallen.any():
-        return ""
-    k = int(np.argmax(fallen))
-    how = (
-        f"its torso leaned by more than {UPRIGHT} rad"
-        if leaning[k]
-        else f"its torso was only {height[k]:.3g} m above the ground"
-    )
-    return f"the robot fell at {recording.time[k]:.3f} s: {how}"
-
-
-def _lasting(time: NDArray[np.float64], low: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Selects the rows (rows,) of `low` in periods that last SUNK_TIME or until the last row."""
-    edges = np.flatnonzero(np.diff(low, prepend=False, append=False)).reshape(-1, 2)
-    lasting = np.zeros_like(low)
-    for begin, end in edges:
-        lasting[begin:end] = end == len(low) or time[end] - time[begin] >= SUNK_TIME
-    return lasting
-
-
-def _lean(recording: Recording, parameters: Mapping[str, float]) -> NDArray[np.float64]:
-    """Returns the angle [rad] between the torso's upward axis and the ground's normal (rows,)."""
-    w, x, y, z = recording.vector("torso.quaternion", 4).T
-    up = np.column_stack(
-        [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)]
-    )
-    return np.asarray(np.arccos(np.clip(up @ _normal(parameters), -1.0, 1.0)))
-
-
-def _normal(parameters: Mapping[str, float]) -> NDArray[np.float64]:
-    """Returns the ground's normal (3,), world axes."""
-    kind = TERRAINS[round(parameters.get("terrain.kind", 1.0)) - 1]
-    heading = parameters.get("terrain.heading", 0.0)
-    incline = parameters.get("terrain.incline", 0.0)
-    return ground_normal(Terrain(kind=kind, height=0.0, incline=incline, heading=heading))
-
-
 def friction_warnings(parameters: Mapping[str, float]) -> list[str]:
     """Warns where friction is too weak for the robot to stay in place or to move forward."""
     law = FRICTION_LAWS[round(parameters["friction.law"]) - 1]
     mu = 0.0 if law == "none" else parameters["friction.mu"]
     gravity = np.array([parameters[name] for name in vector_names("gravity")])
     static = parameters.get("friction.mu_static", 0.0) if law in BRISTLE_LAWS else 0.0
-    slide = float(np.linalg.norm(sliding(gravity, _normal(parameters), mu, static)))
+    slide = float(np.linalg.norm(sliding(gravity, ground_normal(parameters), mu, static)))
     if slide:
         why = "without friction" if mu == 0.0 else f"which friction (mu = {mu:g}) does not hold"
         return [
@@ -193,7 +102,7 @@ def walk_warnings(view: View, robot: Robot) -> list[str]:
     found += [*fallback_warnings(recording), *servo_warnings(recording, robot)]
     found += overlap_warnings(recording, view.parameters)
     found += sinkage_warnings(recording, view.parameters)
-    return [*found, *energy_warnings(view)]
+    return [*found, *run_balance_warnings(view.energy_residual)]
 
 
 def overlap_warnings(recording: Recording, parameters: Mapping[str, float]) -> list[str]:
@@ -274,11 +183,6 @@ def servo_warnings(recording: Recording, robot: Robot) -> list[str]:
     return [text] if torque[worst] > limit else []
 
 
-def energy_warnings(view: View) -> list[str]:
-    """Warns where the energy balance misses more than metrics of energy can tolerate."""
-    return run_balance_warnings(view.energy_residual)
-
-
 def short_run_warnings(view: View) -> list[str]:
     """Warns of a run that is too short for metrics, with the duration that it needs."""
     time, needed = view.recording.time, (SKIPPED_CYCLES + 1) * view.period
@@ -305,3 +209,31 @@ def missing_metrics_warnings(view: View) -> list[str]:
     if recorded and not (window.recording.columns(names) > 0.5).any():
         found.append("no foot swung: foot_error_swing has no value")
     return found
+
+
+def heat_warnings(recording: Recording, servo: Servo) -> list[str]:
+    """Warns of windings that were above the temperature from which on the duty limit falls.
+
+    recording: without temperatures, as of a run that records metrics alone, nothing is said.
+    """
+    names = joint_names("winding_temperature")
+    if servo.winding_capacity == 0.0 or not set(names) <= set(recording.names):
+        return []
+    windings = recording.columns(names)  # (rows, joints) [K]
+    hot = windings.max(axis=0) > servo.derate_temperature
+    if not hot.any():
+        return []
+    first = int(np.argmax((windings > servo.derate_temperature).any(axis=1)))
+    worst = names[int(np.argmax(windings.max(axis=0)))].removesuffix(".winding_temperature")
+    return [
+        f"{int(hot.sum())} of {len(names)} servos gave less torque because they were hot, from "
+        f"{recording.time[first]:.3g} s on: the winding of {worst} reached {windings.max():.1f} K "
+        f"(servo.derate_temperature {servo.derate_temperature:g} K, servo.temperature_max "
+        f"{servo.temperature_max:g} K)"
+    ]
+
+
+def run_balance_warnings(residual: float) -> list[str]:
+    """Warns where a run's balance misses more than metrics of energy can tolerate."""
+    text = f"the energy balance does not explain {residual:.2%} of the motors' work: {FIX}"
+    return [text] if Unbalanced.among([residual]).count else []

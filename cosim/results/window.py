@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Recording
-from hexapod_cosim.cosim.results.feet import feet_of_angles
-from hexapod_cosim.models import FRICTION_LAWS, TERRAINS
+from hexapod_cosim.models import FRICTION_LAWS
 from hexapod_cosim.models.friction import BRISTLE_LAWS
 from hexapod_cosim.models.ground.surface import Surface
 
@@ -29,8 +28,6 @@ LEAST_DISTANCE = 0.01  # m    less is standing, not walking
 LEAST_TURN = 0.05  # rad    less is standing, not turning
 SHOWN_CYCLES = 3  # in plots of what happens within a gait cycle
 ROUND_OFF = 1e-6  # s    of a recorded time
-# numbers of the FMU's enumerations
-FLAT, SLOPE, GRID = (TERRAINS.index(kind) + 1 for kind in ("flat", "slope", "grid"))
 NONE, TANH = (FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh"))
 WITH_BRISTLES = tuple(FRICTION_LAWS.index(law) + 1 for law in BRISTLE_LAWS)
 
@@ -266,73 +263,3 @@ def commanded_path(recording: Recording, *, heading: float | None = None) -> Arr
     vx, vy = recording.column("command.vx"), recording.column("command.vy")
     velocity = (vx * np.cos(angle) - vy * np.sin(angle), vx * np.sin(angle) + vy * np.cos(angle))
     return begin + np.column_stack([held_integral(recording.time, part) for part in velocity])
-
-
-def body_height(part: Recording, parameters: Mapping[str, float]) -> Array:
-    """Returns the height of the torso above the ground along z [m] (rows,).
-
-    The ground of a surface is the mean height of the feet in contact, of the last ones while there
-    are none. Its height below the torso would jump at each stone and gap.
-    """
-    x, y, z = part.vector("torso.position").T
-    if parameters.get("terrain.kind", FLAT) == GRID:
-        return np.asarray(z - _feet_level(part, parameters))
-    heading = parameters.get("terrain.heading", 0.0)
-    rise = x * np.cos(heading) + y * np.sin(heading)
-    ground: Array = parameters.get("terrain.height", 0.0) + np.tan(_incline(parameters)) * rise
-    return np.asarray(z - ground)
-
-
-def _feet_level(part: Recording, parameters: Mapping[str, float]) -> Array:
-    """Returns the mean height of the contact points of feet in contact [m] (rows,).
-
-    Rows without a contact have the value of the last row with one; before the first contact it is
-    `terrain.height`.
-    """
-    in_contact = part.feet("contact") > 0.5
-    count = in_contact.sum(axis=1)
-    height = np.where(in_contact, part.foot_vectors("position")[:, :, 2], 0.0).sum(axis=1)
-    level = height / np.maximum(count, 1)
-    latest = np.maximum.accumulate(np.where(count > 0, np.arange(len(count)), -1))
-    before = parameters.get("terrain.height", 0.0)
-    return np.where(latest >= 0, level[np.maximum(latest, 0)], before)
-
-
-def ground_normal(parameters: Mapping[str, float]) -> Array:
-    """Returns the ground's upward normal (3,), world axes; that of a surface is the vertical."""
-    heading, incline = parameters.get("terrain.heading", 0.0), _incline(parameters)
-    sine = np.sin(incline)
-    return np.array([-sine * np.cos(heading), -sine * np.sin(heading), np.cos(incline)])
-
-
-def _incline(parameters: Mapping[str, float]) -> float:
-    """Returns the incline of the ground [rad], which is 0 for all but slopes."""
-    slope = parameters.get("terrain.kind", FLAT) == SLOPE
-    return float(parameters.get("terrain.incline", 0.0)) if slope else 0.0
-
-
-def real_feet(recording: Recording, parameters: Mapping[str, float]) -> Array:
-    """Returns the centres of the feet in the torso's frame [m] (rows, 6, 3).
-
-    On a plane they are a radius above the contact points, along the normal. On a surface, whose
-    normal depends on the place, they follow from the joint angles.
-    """
-    if parameters.get("terrain.kind", FLAT) == GRID:
-        return feet_of_angles(recording, parameters)
-    w, x, y, z = recording.vector("torso.quaternion", 4).T
-    turn = np.array([
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ])  # fmt: skip
-    centres = recording.foot_vectors("position") + parameters["foot.radius"] * ground_normal(
-        parameters
-    )
-    arms = centres - recording.vector("torso.position")[:, None, :]
-    com = np.array([parameters[name] for name in vector_names("torso.com")])
-    along = arms.transpose(2, 1, 0)  # (3, 6, rows)
-    seen = [
-        turn[0, i] * along[0] + turn[1, i] * along[1] + turn[2, i] * along[2] + com[i]
-        for i in range(3)
-    ]
-    return np.array(seen).transpose(2, 1, 0)

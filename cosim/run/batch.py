@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import Executor, Future
+from collections.abc import Generator, Sequence
+from concurrent.futures import Future
 from contextlib import nullcontext
 from dataclasses import dataclass
-from functools import cache, partial
-from itertools import islice
+from functools import cache
 from multiprocessing.util import Finalize
 from pathlib import Path
 
@@ -16,11 +14,11 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
-from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains
+from hexapod_cosim.cosim.run.plan import chosen_gains
+from hexapod_cosim.cosim.run.plant import PlantFmus
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.run.worker_pool import (
-    SerialExecutor,
     WorkerDiedError,
     WorkerPool,
     processor_count,
@@ -29,8 +27,6 @@ from hexapod_cosim.cosim.run.worker_pool import (
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError
-
-MAX_AHEAD = 8  # runs for each worker that may be finished before one that was submitted earlier
 
 
 @dataclass(frozen=True)
@@ -71,12 +67,14 @@ def run_batch(
         count = min(processor_count() if workers is None else workers, len(tasks))
         if count <= 1:
             with Runner() if compiled else nullcontext() as runner:
-                run: Callable[[_Task], Summary] = partial(_run, runner=runner)
-                yield from _in_order(tasks, SerialExecutor(), run, ahead=1)
+                for task in tasks:
+                    yield _completed(_run(task, runner))
         else:
             with WorkerPool(count) as pool:
                 run = _run_compiled if compiled else _run
-                yield from _in_order(tasks, pool, run, ahead=MAX_AHEAD * count)
+                futures = [pool.submit(run, task) for task in tasks]
+                for task, future in zip(tasks, futures, strict=True):
+                    yield _completed(_summary_of(task, future))
 
 
 def _prepare(scenario: Scenario, fmus: PlantFmus, gains: Gains | None) -> _Task:
@@ -88,26 +86,10 @@ def _prepare(scenario: Scenario, fmus: PlantFmus, gains: Gains | None) -> _Task:
         return _Task(scenario, refusal=refused_summary(scenario, error))
 
 
-def _in_order(
-    tasks: Sequence[_Task], executor: Executor, run: Callable[[_Task], Summary], *, ahead: int
-) -> Iterator[Summary]:
-    """Runs tasks and yields their summaries in the order of the tasks.
-
-    At most `ahead` tasks are submitted before the first of them is finished.
-    """
-    rest, submitted = iter(tasks), deque[tuple[_Task, Future[Summary]]]()
-    while True:
-        more = islice(rest, ahead - len(submitted))
-        submitted.extend((task, executor.submit(run, task)) for task in more)
-        if not submitted:
-            return
-        yield _summary_of(*submitted.popleft())
-
-
 def _summary_of(task: _Task, future: Future[Summary]) -> Summary:
     """Returns the summary of a task. Raises HexapodError when its worker died."""
     try:
-        summary = future.result()
+        return future.result()
     except WorkerDiedError as error:
         label = control_of(task.scenario.control).label
         raise HexapodError(
@@ -115,6 +97,10 @@ def _summary_of(task: _Task, future: Future[Summary]) -> Summary:
             got=f"{task.scenario.title}, seed {task.scenario.seed}, {label} control",
             fix="look for what ended it (memory?), or run fewer at once",
         ) from error
+
+
+def _completed(summary: Summary) -> Summary:
+    """Returns the summary of a run. Raises KeyboardInterrupt when the run was interrupted."""
     if summary.status == INTERRUPTED:
         raise KeyboardInterrupt
     return summary

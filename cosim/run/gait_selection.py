@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.controller import BodyCommand, Gains, GainsError, Gait, make_gait
-from hexapod_cosim.cosim.control.fmu_walk import walk_of_fmu
+from hexapod_cosim.cosim.control.fmu_law import walk_of_fmu
 from hexapod_cosim.cosim.design.stance import (
     SPEED_SHARE,
     Motion,
@@ -33,8 +33,8 @@ from hexapod_cosim.cosim.design.stance import (
     with_stance,
 )
 from hexapod_cosim.cosim.export.robot_package import SPEED
-from hexapod_cosim.cosim.results.gait_choice import OF_FMU, GaitChoice
-from hexapod_cosim.cosim.run.kept_designs import Stance, kept_stance
+from hexapod_cosim.cosim.results.facts import OF_FMU, GaitChoice
+from hexapod_cosim.cosim.run.designs import Stance, kept_stance
 from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.reach import reaches
 from hexapod_cosim.cosim.scenario.reading import scenario_robot

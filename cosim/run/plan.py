@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from hexapod_cosim.controller import Gains
+from hexapod_cosim.controller import Gains, GainsError, Gait, make_gait
 from hexapod_cosim.cosim.interface.controller import ControllerSetup
+from hexapod_cosim.cosim.run.designs import designed_gains
 from hexapod_cosim.cosim.run.gait_selection import GaitSelection, select_gait
-from hexapod_cosim.cosim.run.preparation import chosen_gains, law_of
 from hexapod_cosim.cosim.scenario.checks import check_servo_faults
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.reading import scenario_robot
-from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
 from hexapod_cosim.cosim.scenario.schedule import Schedule, make_schedule
 from hexapod_cosim.cosim.scenario.variation import (
     Drawn,
     delayed,
     draw,
 )
-from hexapod_cosim.models import Robot
+from hexapod_cosim.models import Robot, unknown_name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,3 +65,70 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> RunPlan:
         schedule=make_schedule(timed),
         drawn=drawn,
     )
+
+
+def chosen_gains(scenario: Scenario, given: Gains | None = None) -> Gains | None:
+    """Returns the gains that a scenario runs with, None unless its control needs gains.
+
+    They are the given ones, or else designed for its robot and macro-step. Raises GainsError when
+    no gains can be designed, HexapodError for a robot that cannot be read.
+    """
+    control = control_of(scenario.control)
+    if not control.is_builtin or control.name == "kinematic":
+        return None
+    return designed_gains(*design_key(scenario)) if given is None else given
+
+
+def law_of(control: str) -> str:
+    """Returns the law of a built-in controller with gains, from the text of a control.
+
+    Kinematic control has no gains and uses no law.
+    """
+    named = control_of(control)
+    return "paper" if named.is_builtin and named.name == "paper" else "compliant"
+
+
+def design_key(scenario: Scenario) -> tuple[Robot, float]:
+    """Returns the robot, in its stance, and the period [s] that gains are designed for.
+
+    Scenarios with equal keys share gains. Raises HexapodError for a robot that cannot be read.
+    """
+    return select_gait(scenario).robot, scenario.macro_step
+
+
+def make_setup(
+    robot: Robot,
+    *,
+    control: str,
+    period: float,
+    gait: str | Gait | None = None,
+    gains: Gains | None = None,
+) -> ControllerSetup:
+    """Returns the controller's set-up as `simulate` would make it.
+
+    Args:
+        control: "kinematic", "paper" or "compliant".
+        period: controller period [s].
+        gait: a gait or its name; by default the gait of the robot file.
+        gains: gains of paper or compliant control; by default they are designed for the robot.
+
+    Raises:
+        HexapodError: the control or the gait is unknown.
+        GainsError: gains are given for kinematic control, or none can be designed.
+    """
+    if control not in CONTROLS:
+        raise unknown_name("control", control, CONTROLS)
+    walked = gait if isinstance(gait, Gait) else make_gait(robot, gait)
+    setup = ControllerSetup(robot=robot, gait=walked, period=period)
+    setup.build()  # refuses an impossible set-up before gains are designed
+    if control == "kinematic":
+        if gains is not None:
+            raise GainsError(
+                "gains for kinematic control, which has none",
+                got=control,
+                expected="paper or compliant",
+                fix="leave out the gains",
+            )
+        return setup
+    chosen = designed_gains(robot, period) if gains is None else gains
+    return replace(setup, gains=chosen, law=control)

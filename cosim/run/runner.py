@@ -11,8 +11,7 @@ from pathlib import Path
 from time import thread_time
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.common.closing import Closing
-from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import (
     connection_of,
     control_facts,
@@ -26,17 +25,22 @@ from hexapod_cosim.cosim.interface.controller import (
     controller_parameters,
 )
 from hexapod_cosim.cosim.master.connection import Connection
-from hexapod_cosim.cosim.master.fmu import Fmu, FmuBlock
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_block import FmuBlock
 from hexapod_cosim.cosim.master.loop import Progress
 from hexapod_cosim.cosim.master.native_loop import NativeMaster
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, chosen_columns
 from hexapod_cosim.cosim.master.sensors import errors_of
+from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.metrics import metric_columns
-from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
 from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
-from hexapod_cosim.cosim.run.plant import different_settings, initialise_plant, run_surface
-from hexapod_cosim.cosim.run.preparation import PlantFmus
+from hexapod_cosim.cosim.run.plant import (
+    PlantFmus,
+    different_settings,
+    initialise_plant,
+    run_surface,
+)
 from hexapod_cosim.cosim.run.single_run import make_result, simulate, start_controller
 from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.records import Scenario

@@ -31,15 +31,17 @@ from hexapod_cosim.cosim.master.loop import (
 from hexapod_cosim.cosim.master.recorder import Recorder, chosen_columns
 from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.results.arrival import is_sent_ahead, missed_end
 from hexapod_cosim.cosim.results.drop import describe_drop
-from hexapod_cosim.cosim.results.facts import FmuIdentity, RobotIdentity, RunFacts
-from hexapod_cosim.cosim.results.heat import heat_warnings
-from hexapod_cosim.cosim.results.metrics import compute_metrics, metric_columns
-from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.warnings import (
+from hexapod_cosim.cosim.results.facts import FmuIdentity, Result, RobotIdentity, RunFacts
+from hexapod_cosim.cosim.results.locomotion import (
     describe_fall,
+    is_sent_ahead,
     locomotion_of,
+    missed_end,
+)
+from hexapod_cosim.cosim.results.metrics import compute_metrics, metric_columns
+from hexapod_cosim.cosim.results.warnings import (
+    heat_warnings,
     missing_metrics_warnings,
     off_map_warnings,
     short_run_warnings,
@@ -50,7 +52,7 @@ from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
 from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant, run_surface
 from hexapod_cosim.cosim.scenario.controls import control_of
-from hexapod_cosim.cosim.scenario.event_log import event_log
+from hexapod_cosim.cosim.scenario.events import event_log
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.surface import Surface

@@ -22,7 +22,6 @@ import numpy as np
 from hexapod_cosim.cosim.scenario.checks import check_interval, check_parameters, check_steps
 from hexapod_cosim.cosim.scenario.controls import read_control
 from hexapod_cosim.cosim.scenario.events import read_events
-from hexapod_cosim.cosim.scenario.quantities import to_si
 from hexapod_cosim.cosim.scenario.records import (
     CONTROLS,
     GRAVITY,
@@ -49,6 +48,7 @@ from hexapod_cosim.cosim.scenario.values import (
     read_record,
     read_seed,
     read_text,
+    to_si,
 )
 from hexapod_cosim.models import Robot, ScenarioError, load_robot
 from hexapod_cosim.models.friction import STATIC_LAWS

@@ -10,7 +10,6 @@ from dataclasses import fields
 from typing import Any
 
 from hexapod_cosim.controller import SWITCHES, Parts
-from hexapod_cosim.cosim.scenario.quantities import to_si
 from hexapod_cosim.cosim.scenario.records import (
     FORMATS,
     GRAVITY,
@@ -26,7 +25,7 @@ from hexapod_cosim.cosim.scenario.records import (
     Walk,
     default_formats,
 )
-from hexapod_cosim.cosim.scenario.values import read_boolean, read_given_keys, read_record
+from hexapod_cosim.cosim.scenario.values import read_boolean, read_given_keys, read_record, to_si
 from hexapod_cosim.models import ScenarioError, nearest_name
 from hexapod_cosim.models.ground.table import patch_specs, read_keys, terrain_specs
 from hexapod_cosim.models.records import Servo, Soil

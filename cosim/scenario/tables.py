@@ -12,7 +12,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.scenario.bundled import list_scenarios
+from hexapod_cosim.cosim.scenario import list_scenarios
 from hexapod_cosim.cosim.scenario.controls import LAW, control_beside
 from hexapod_cosim.cosim.scenario.records import KEYS, SECTIONS
 from hexapod_cosim.models import ScenarioError, unknown_name

@@ -7,9 +7,8 @@ from contextlib import closing
 from dataclasses import dataclass
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.results.arrival import missed_end
-from hexapod_cosim.cosim.results.balance import UNBALANCED
-from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.results.locomotion import missed_end
+from hexapod_cosim.cosim.results.summary import UNBALANCED, Summary
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.extensions.course.records import QUANTITIES, Case, Course, Entry, run_scenario

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.results.comparison import Change, change_of, half_width_of
-from hexapod_cosim.cosim.results.metrics import FLOORS
+from hexapod_cosim.cosim.results.metric_table import FLOORS
 from hexapod_cosim.cosim.scenario.controls import AT, CHOOSER, reference_of
 from hexapod_cosim.cosim.scenario.records import CHOSEN
 from hexapod_cosim.extensions.course.records import BY_NAME, QUANTITIES, SHOWN, Case, Course

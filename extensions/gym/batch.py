@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import DEFAULT_PERIOD
-from hexapod_cosim.cosim.common.closing import Closing
-from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.native_loop import step_functions
@@ -160,7 +159,8 @@ class Batch(Closing):
         """Returns the functions of an FMU and what its instances are made with."""
         calls: dict[str, Any] = {name: fmu.address(call) for name, call in CALLS.items()}
         calls["step"] = step_functions(fmu, None)
-        texts = {"guid": fmu.description.guid.encode(), "resources": fmu.resources.encode()}
+        resources = fmu.resources.resolve().as_uri().encode()
+        texts = {"guid": fmu.description.guid.encode(), "resources": resources}
         self._kept.append(texts)
         return NativeFmu(**calls, **texts)
 

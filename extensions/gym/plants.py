@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.controller import DEFAULT_PERIOD, make_gait
 from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.interface.controller import ControllerSetup
-from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.extensions.gym.settings import EnvSettings, symmetric
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.ground.faces import ground_height, surface_heights, surface_of

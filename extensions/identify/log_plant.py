@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.common.closing import Closing
+from hexapod_cosim.cosim.common.temporary import Closing
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.extensions.identify.log import Log, LogError
 from hexapod_cosim.models import FmuError

@@ -123,7 +123,7 @@ def _gains_of(plan: Scenario, given: Gains | None) -> tuple[Gains | None, str]:
     plan: as the live robot walks it.
     Raises GainsError when the scenario's own control needs them.
     """
-    from hexapod_cosim.cosim.run.preparation import chosen_gains  # noqa: PLC0415  a slow import
+    from hexapod_cosim.cosim.run.plan import chosen_gains  # noqa: PLC0415  a slow import
 
     try:
         with waiting("designing the gains"):
@@ -155,7 +155,7 @@ def realtime(
     json: Json = False,
 ) -> None:
     """Measure doStep of the plant in a walk: quantiles and histogram, touch-downs apart."""
-    from hexapod_cosim.cosim.run.preparation import chosen_gains  # noqa: PLC0415
+    from hexapod_cosim.cosim.run.plan import chosen_gains  # noqa: PLC0415
     from hexapod_cosim.extensions.live import realtime as live  # noqa: PLC0415  draws with Matplotlib
     from hexapod_cosim.extensions.live.settings import live_scenario  # noqa: PLC0415
 

@@ -19,9 +19,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Gains
-from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
-from hexapod_cosim.cosim.common.files import atomic_path
+from hexapod_cosim.controller.figure_style import PALETTE, SETTINGS, WIDTH
 from hexapod_cosim.cosim.interface.names import foot_names
+from hexapod_cosim.cosim.report.figures import Figures, figure_files, write_figures
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.extensions.live.recording import NO_FORCE
 from hexapod_cosim.extensions.live.robot import LiveRobot
@@ -151,14 +151,9 @@ def table_of(facts: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
 def write(times: StepTimes, folder: Path) -> list[Path]:
     """Writes the histogram as PNG and SVG; returns the files."""
     folder.mkdir(parents=True, exist_ok=True)
-    files = []
     with matplotlib.rc_context(SETTINGS):
-        figure = draw(times)
-        for kind, metadata in UNDATED.items():
-            files.append(folder / f"{FIGURE}.{kind}")
-            with atomic_path(files[-1]) as temporary:
-                figure.savefig(temporary, format=kind, dpi=DPI, metadata=metadata)
-    return files
+        images = {f"{FIGURE}.{kind}": image for kind, image in figure_files(draw(times))}
+    return write_figures(Figures(images, {}), folder)
 
 
 def draw(times: StepTimes) -> Figure:

@@ -9,7 +9,7 @@ Changes while the robot walks:
 - friction: the plant begins again in its present pose and motion, on ground of the new friction.
   Bristles of the friction laws and the measures of work and slip begin at zero.
 - control, from a built-in one to another: it goes on in the present phase of the walk at once.
-- gait of a built-in control: the robot walks on slowly meanwhile (`gait_change.py`).
+- gait of a built-in control: the robot walks on slowly meanwhile (`settings.py`).
 - ground, and control or gait where a controller of the user walks: the robot is placed at its
   start.
 
@@ -23,25 +23,31 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 from hexapod_cosim.controller import BodyCommand, ControllerError, Gains, Gait, JointCommand
-from hexapod_cosim.cosim.common.closing import Closing
-from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import make_controller
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw, law_of_ours
 from hexapod_cosim.cosim.export.plant import export_controller
 from hexapod_cosim.cosim.interface.controller import controller_parameters
-from hexapod_cosim.cosim.master.fmu import Fmu, StepError
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_block import StepError
 from hexapod_cosim.cosim.master.loop import JointController, macro_step
 from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.window import robot_weight
 from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
-from hexapod_cosim.cosim.run.plant import apply_settings, initialise_plant
-from hexapod_cosim.cosim.run.preparation import PlantFmus
+from hexapod_cosim.cosim.run.plant import PlantFmus, apply_settings, initialise_plant
 from hexapod_cosim.cosim.scenario.controls import control_of
-from hexapod_cosim.extensions.live.gait_change import GaitChange, plan_change
 from hexapod_cosim.extensions.live.messages import Change
 from hexapod_cosim.extensions.live.recording import Force
-from hexapod_cosim.extensions.live.settings import Choices, Limits, Settings, find_limits, gait_of
+from hexapod_cosim.extensions.live.settings import (
+    Choices,
+    GaitChange,
+    Limits,
+    Settings,
+    find_limits,
+    gait_of,
+    plan_change,
+)
 from hexapod_cosim.models import HexapodError
 
 HORIZON = 1e6  # s    stop time of the FMUs

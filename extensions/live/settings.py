@@ -25,6 +25,8 @@ FLAT = "flat"
 NEED_FILES = ("heightfield",)  # grounds that cannot be chosen by name alone
 REACHED = 0.6  # largest command as a share of what the legs reach
 PROBE = np.array([1.0, 1.0, 3.0])  # m/s, m/s, rad/s    more than legs reach
+# of the commands that both gaits allow, during a change: no leg reaches its limits (C55)
+SHARE = 0.3
 HEIGHT = 0.1  # m    of the torso above its stance, more than legs reach
 
 
@@ -166,3 +168,27 @@ def find_limits(robot: Robot, gait: Gait) -> Limits:
 def _reached(part: NDArray[np.float64], robot: Robot, gait: Gait) -> float:
     """Returns the size of the largest share of a command (6,) that the legs follow alone."""
     return float(np.abs(part).max()) * largest_share(part, np.zeros(6), robot, gait)
+
+
+@dataclass(frozen=True)
+class GaitChange:
+    """The plan of a change of gait while the robot walks; times since the request.
+
+    Feet stand longer during a change than in either gait and need more reach
+    (docs/control/gait.md, C55). So the robot walks slowly from the request until every leg has made
+    a step in the next gait. The server's loop and the page without a server follow this plan.
+    """
+
+    limits: Limits  # of commands until `end`
+    begin: float  # s    the robot is slow, and the controller gets the next gait
+    settled: float  # s    no leg steps in the gait before
+    end: float  # s    each leg has made its first step in the next gait
+
+
+def plan_change(robot: Robot, before: Gait, after: Gait) -> GaitChange:
+    """Returns the plan of a change between two gaits of a robot."""
+    limits = find_limits(robot, before).least(find_limits(robot, after)).times(SHARE)
+    swing = before.period * (1.0 - before.duty)
+    begin = before.period  # the ramp to a slower command takes a gait period (C1)
+    settled = begin + swing
+    return GaitChange(limits, begin, settled, settled + swing + after.period)

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
-from hexapod_cosim.cosim.report.geometry import describe_ground, describe_shape
-from hexapod_cosim.cosim.report.surface import pack_surface
+from hexapod_cosim.cosim.report.geometry import describe_ground, describe_shape, pack_surface
 from hexapod_cosim.cosim.results.window import robot_weight
 from hexapod_cosim.extensions.live.pacing import Pacer
 from hexapod_cosim.extensions.live.robot import LiveRobot

@@ -19,9 +19,8 @@ from hexapod_cosim.cosim.export.cross_build import BROWSER, Library, build_libra
 from hexapod_cosim.cosim.interface.plant import enumerations_of, load_interface
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import CONTROLS
-from hexapod_cosim.extensions.live.gait_change import plan_change
+from hexapod_cosim.extensions.live import settings as live
 from hexapod_cosim.extensions.live.page import render_page
-from hexapod_cosim.extensions.live.settings import FLAT, Choices, control_texts, find_limits
 from hexapod_cosim.extensions.live.state import describe_world
 from hexapod_cosim.models import HexapodError, Robot, load_robot
 
@@ -34,20 +33,20 @@ def write_static_page(path: Path) -> Path:
     Raises HexapodError without the viewer or the module, and when the path cannot be written.
     """
     scenario = load_scenario("walk_flat")
-    choices = Choices(scenario, control_texts(scenario), {})
+    choices = live.Choices(scenario, live.control_texts(scenario), {})
     module = base64.b64encode(robot_module()).decode("ascii")
     write_text(path, render_page(choices, _setup(choices), module=module))
     return path
 
 
-def _setup(choices: Choices) -> dict[str, Any]:
+def _setup(choices: live.Choices) -> dict[str, Any]:
     """Returns what the page reads (viewer/local.ts)."""
     robot, types = load_robot(choices.scenario.robot), enumerations_of(CONTROLLER)
     known = [v for v in load_interface(robot).variables if v.causality == "parameter"]
     start = {one.name: float(one.start) for one in known if one.start is not None}
     return {
         "world": describe_world(robot, start, choices.scenario.macro_step),
-        "first": vars(replace(choices.first(), ground=FLAT)),
+        "first": vars(replace(choices.first(), ground=live.FLAT)),
         "grounds": [],
         "numbers": {name: types["Control"].number(name) for name in CONTROLS},
         "walks": {name: _walk(robot, name, types["GaitPattern"].number(name)) for name in PATTERNS},
@@ -57,10 +56,10 @@ def _setup(choices: Choices) -> dict[str, Any]:
 def _walk(robot: Robot, name: str, pattern: int) -> dict[str, Any]:
     """Returns a gait in the order of hx_page_gait (wasm/robot.c), and the changes from it."""
     gait = make_gait(robot, name)
-    plans = {other: plan_change(robot, gait, make_gait(robot, other)) for other in PATTERNS}
+    plans = {other: live.plan_change(robot, gait, make_gait(robot, other)) for other in PATTERNS}
     return {
         "gait": [pattern, gait.period, gait.duty, gait.step_height, gait.touchdown_speed],
-        "limits": vars(find_limits(robot, gait)),
+        "limits": vars(live.find_limits(robot, gait)),
         "changes": {other: asdict(plan) for other, plan in plans.items()},
     }
 

@@ -11,10 +11,10 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.controller.gains import PARTS
 from hexapod_cosim.cosim.interface.plant import Interface, load_interface
 from hexapod_cosim.cosim.scenario.controls import LAW
-from hexapod_cosim.cosim.scenario.quantities import QUANTITY
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.tables import with_values
+from hexapod_cosim.cosim.scenario.values import QUANTITY
 from hexapod_cosim.extensions.study.factors import PARAMETERS, samples
 from hexapod_cosim.extensions.study.records import (
     DRAWN,

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.cosim.scenario.records import COMPARED
 from hexapod_cosim.extensions.study.records import (
     INTEGERS,

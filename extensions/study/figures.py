@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.controller.figure_style import SETTINGS
 from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.report.figures import Figures, figure_files, write_figures
-from hexapod_cosim.cosim.results.metrics import FLOORS, METRICS
+from hexapod_cosim.cosim.results.metric_table import FLOORS, METRICS
 from hexapod_cosim.extensions.study.groups import Point
 from hexapod_cosim.extensions.study.records import GRID, VALUES, Factor, Study
 from hexapod_cosim.extensions.study.search import Trial

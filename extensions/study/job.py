@@ -17,15 +17,15 @@ from hexapod_cosim.cosim.common.plant_files import code_hash, package_version
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.export.plant import export_controller
-from hexapod_cosim.cosim.run.controller_setup import make_setup
-from hexapod_cosim.cosim.run.preparation import PlantFmus, chosen_gains, design_key
+from hexapod_cosim.cosim.run.plan import chosen_gains, design_key, make_setup
+from hexapod_cosim.cosim.run.plant import PlantFmus
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.scenario.controls import table_with_control
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import with_values
 from hexapod_cosim.extensions.study.factors import samples
 from hexapod_cosim.extensions.study.records import Study, StudyError
-from hexapod_cosim.models import HexapodError, list_robots, load_robot
+from hexapod_cosim.models import list_robots, load_robot
 
 FORMAT = 2  # of a study's folder
 PACKAGES = ("fmpy", "numpy", "scipy", "control")
@@ -70,13 +70,13 @@ def make_job(
             fix=fix,
             where="--fmu",
         )
-    files = {name: _read(Path(name)) for name in names if name not in list_robots()}
+    files = {name: Path(name).read_bytes() for name in names if name not in list_robots()}
     with TemporaryFolder("study") as folder:
         plants = PlantFmus(folder, given=fmu)
         return Job(
             name=uuid4().hex,
             study=study,
-            fmus={name: _read(plants.fmu(name)) for name in names},
+            fmus={name: plants.fmu(name).read_bytes() for name in names},
             controller=_controller(folder),
             robots=files,
             laws=_laws(study),
@@ -100,7 +100,9 @@ def _laws(study: Study) -> dict[str, bytes]:
     for case in study.cases.values():
         table = with_values(case.table, varied)
         check_control(scenario_from_table(table, where=case.where), controls)
-    return {control.label: _read(control.path) for control in controls if control.path is not None}
+    return {
+        control.label: control.path.read_bytes() for control in controls if control.path is not None
+    }
 
 
 def _robots(study: Study) -> list[str]:
@@ -116,15 +118,6 @@ def _controller(folder: Path) -> bytes:
     """Exports the controller FMU to a folder and returns its content."""
     setup = make_setup(load_robot(list_robots()[0]), control="kinematic", period=DEFAULT_PERIOD)
     return export_controller(setup, folder / "controller.fmu").read_bytes()
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise HexapodError(
-            "cannot read", got=error.strerror, expected="a file", where=str(path)
-        ) from error
 
 
 def _common_gains(study: Study) -> Gains | None:

@@ -12,7 +12,7 @@ from hexapod_cosim.cosim.common.files import without_none, write_text
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.report.page import embedded, render
 from hexapod_cosim.cosim.results.comparison import METHOD
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.extensions.study import tables
 from hexapod_cosim.extensions.study.figures import drawings, save
 from hexapod_cosim.extensions.study.records import SOBOL, Study

@@ -19,7 +19,7 @@ import numpy as np
 from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.common.installation import install_extra
 from hexapod_cosim.cosim.results.comparison import change_of
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.extensions.study.dispatch import ResultSink, dispatch
 from hexapod_cosim.extensions.study.groups import Point, Runs
 from hexapod_cosim.extensions.study.records import (

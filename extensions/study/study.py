@@ -23,7 +23,6 @@ from hexapod_cosim.cosim.cli.terminal import (
     show_text,
     warn,
 )
-from hexapod_cosim.cosim.common.events import EventSink, ignore_event
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import METHOD
 from hexapod_cosim.cosim.run.runner import Runner
@@ -46,6 +45,7 @@ from hexapod_cosim.extensions.study.search import optimise
 from hexapod_cosim.extensions.study.store import Store
 from hexapod_cosim.extensions.study.summary import Results, read_results, summary_of
 from hexapod_cosim.extensions.study.workers import (
+    EventSink,
     Workers,
     cluster_workers,
     in_process_workers,
@@ -67,7 +67,7 @@ class Options:
     workers: int | None = None
     scheduler: str | None = None  # address of a Dask scheduler that replaces the processes
     command: str = ""  # command line that repeats the study, for its report
-    events: EventSink = ignore_event  # for instance that the study waits for workers
+    events: EventSink = lambda _text: None  # for instance that the study waits for workers
     runner: type[Runner] = Runner  # a class that workers can import
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.cosim.common.files import RUN_FILE, read_json, write_json
-from hexapod_cosim.cosim.results.balance import UNBALANCED, Unbalanced
-from hexapod_cosim.cosim.results.metrics import OF_THE_RUN
+from hexapod_cosim.cosim.results.metric_table import OF_THE_RUN
+from hexapod_cosim.cosim.results.summary import UNBALANCED, Unbalanced
 from hexapod_cosim.extensions.study.folder import MANIFEST
 from hexapod_cosim.extensions.study.groups import LAST, Figures, Point, Runs, points_of
 from hexapod_cosim.extensions.study.reading import study_from_table

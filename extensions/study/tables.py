@@ -9,7 +9,7 @@ from typing import Any
 
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import Change
-from hexapod_cosim.cosim.results.metrics import DUST, FLOORS, METRICS, shown_metrics
+from hexapod_cosim.cosim.results.metric_table import DUST, FLOORS, METRICS, shown_metrics
 from hexapod_cosim.extensions.study.groups import Mean, Point
 from hexapod_cosim.extensions.study.records import WALKED, Factor
 from hexapod_cosim.extensions.study.store import FIGURES

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from tempfile import gettempdir
 from threading import Lock
 from time import perf_counter
 
@@ -17,7 +16,7 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.loop import FAILED, INTERRUPTED
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
-from hexapod_cosim.cosim.run.preparation import chosen_gains
+from hexapod_cosim.cosim.run.plan import chosen_gains
 from hexapod_cosim.cosim.run.worker_pool import raise_if_stopped
 from hexapod_cosim.cosim.scenario.controls import PYTHON, control_of, split_walk, table_with_control
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table
@@ -86,34 +85,25 @@ def _close_contexts() -> None:
 class _JobContext:
     """A job that is unpacked in this process.
 
-    Raises StudyError when the process has other versions or the disk is full.
+    Raises StudyError when the process has other versions.
     """
 
     def __init__(self, job: Job) -> None:
         _check_environment(job)
         self.job, self._folder = job, TemporaryFolder("job")
-        try:
-            self._files = {
-                name: self._unpack(f"robot{k}{Path(name).suffix}", data)
-                for k, (name, data) in enumerate(job.robots.items())
-            }
-            self._fmus = {
-                name: self._unpack(f"fmu{k}.fmu", data)
-                for k, (name, data) in enumerate(job.fmus.items())
-            }
-            self._controls = {
-                label: self._local(f"law{k}", label, text)
-                for k, (label, text) in enumerate(job.study.texts.items())
-            }
-            self._controller = self._unpack("controller.fmu", job.controller)
-        except OSError as error:
-            raise StudyError(
-                "a worker cannot unpack its job",
-                got=error.strerror,
-                expected="room for temporary files",
-                fix="make room there, or name another folder with TMPDIR",
-                where=gettempdir(),
-            ) from error
+        self._files = {
+            name: self._unpack(f"robot{k}{Path(name).suffix}", data)
+            for k, (name, data) in enumerate(job.robots.items())
+        }
+        self._fmus = {
+            name: self._unpack(f"fmu{k}.fmu", data)
+            for k, (name, data) in enumerate(job.fmus.items())
+        }
+        self._controls = {
+            label: self._local(f"law{k}", label, text)
+            for k, (label, text) in enumerate(job.study.texts.items())
+        }
+        self._controller = self._unpack("controller.fmu", job.controller)
         self._runner = job.runner(controller=self._controller)
 
     def _unpack(self, name: str, content: bytes) -> Path:

@@ -15,7 +15,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from hexapod_cosim.cosim.common.events import EventSink
 from hexapod_cosim.cosim.common.files import not_writable
 from hexapod_cosim.cosim.common.installation import install_extra
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
@@ -25,6 +24,7 @@ from hexapod_cosim.extensions.study.job import Job
 from hexapod_cosim.extensions.study.records import StudyError
 from hexapod_cosim.extensions.study.worker import close_job_context, unpack_job
 
+EventSink = Callable[[str], None]  # receives messages about waiting and corrections
 CONNECT_TIMEOUT = "10s"
 ADDRESS = re.compile(r"[a-z]+://\S+")  # PROTOCOL://HOST:PORT, as Dask writes it
 FIX_RESUME = "start the study again when it is back; it continues, and all stored runs are kept"

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from command import COMMAND, QUICK, Call, settings
 
-from hexapod_cosim.cosim.results.comparison import read_seeds
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.cosim.results.recordings import read_csv
+from hexapod_cosim.cosim.results.side_by_side import read_seeds
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Variation
 from hexapod_cosim.cosim.scenario.variation import STANDARD

@@ -1,7 +1,10 @@
-"""Shell completion, requested as the shells request it."""
+"""Tests shell completion, as the shells request it, and the examples that
+hexapod examples copies.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -9,10 +12,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from command import COMMAND
+from command import COMMAND, Call
 
 from hexapod_cosim.cosim.cli import main
-from hexapod_cosim.cosim.scenario.bundled import list_scenarios
+from hexapod_cosim.cosim.scenario import list_scenarios
 from hexapod_cosim.models import list_robots
 
 Ask = Callable[..., list[str]]
@@ -121,3 +124,26 @@ def test_help_and_completion_import_nothing_slow(words: str) -> None:
     command = [sys.executable, "-c", script]
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
     assert not SLOW & set(done.stdout.split())
+
+
+# `hexapod examples` copies what comes with the package into a folder of its own.
+
+
+def test_examples_are_copied_as_they_are(call: Call, tmp_path: Path) -> None:
+    code, out, _ = call("examples", "-o", tmp_path / "mine", "--json")
+    assert code == 0
+    names = {
+        Path(name).relative_to(tmp_path / "mine").as_posix() for name in json.loads(out)["files"]
+    }
+    assert {"02_walk.py", "controllers/cpg.py", "notebooks/first_walk.ipynb"} <= names
+    assert not any("__pycache__" in name for name in names)
+    source = Path(__file__).parents[2] / "examples" / "02_walk.py"
+    assert (tmp_path / "mine" / "02_walk.py").read_bytes() == source.read_bytes()
+
+
+def test_a_folder_with_files_is_refused_and_left_alone(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
+    code, _, err = call("examples", "-o", tmp_path)
+    assert code == 1
+    assert "a new or an empty folder" in err
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]

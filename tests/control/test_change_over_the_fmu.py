@@ -16,7 +16,8 @@ from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
     controller_parameters,
 )
-from hexapod_cosim.cosim.master.fmu import Fmu, StepError
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_block import StepError
 from hexapod_cosim.models import LEG_NAMES, load_robot
 
 STEP = 0.005  # s

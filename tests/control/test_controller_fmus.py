@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 from command import Call
 
-from hexapod_cosim.cosim.control.fmu_walk import walk_of_fmu
+from hexapod_cosim.cosim.control.fmu_law import walk_of_fmu
 from hexapod_cosim.cosim.export.plant import export_controller
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.connection import FmuVariable, connect, names_of_map, read_map
-from hexapod_cosim.cosim.master.fmu import Fmu, StepError
-from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_block import StepError
+from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario

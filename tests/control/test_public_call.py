@@ -16,8 +16,8 @@ from command import Call, assert_refused
 import hexapod_cosim
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
 from hexapod_cosim.cosim.control.new_law import class_name, module_name, write_law
-from hexapod_cosim.cosim.results.metrics import METRICS
-from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.facts import Result
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.models import HexapodError, Robot
 
 NEEDS_PUBLIC_CALL = pytest.mark.usefixtures("plant_build")

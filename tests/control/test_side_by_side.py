@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from command import COMMAND, QUICK, Call, assert_refused
 
-from hexapod_cosim.cosim.results.comparison import read_seeds
+from hexapod_cosim.cosim.results.side_by_side import read_seeds
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CPG = f"{EXAMPLES / 'controllers' / 'cpg.py'}:Cpg"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
 from hexapod_cosim.cosim.interface.plant import load_interface
-from hexapod_cosim.cosim.master.fmu import StepError
+from hexapod_cosim.cosim.master.fmu_block import StepError
 from hexapod_cosim.models import load_robot
 
 SPEED = 0.08  # m/s of the torso

@@ -18,7 +18,7 @@ import pytest
 from command import COMMAND, settings
 
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED
-from hexapod_cosim.cosim.results.comparison import read_seeds
+from hexapod_cosim.cosim.results.side_by_side import read_seeds
 from hexapod_cosim.cosim.results.summary import REFUSED, Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.single_run import simulate

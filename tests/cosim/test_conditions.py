@@ -12,7 +12,7 @@ from hexapod_cosim.controller import GainsError
 from hexapod_cosim.cosim.design.gains import design_for
 from hexapod_cosim.cosim.export.robot_package import read_values
 from hexapod_cosim.cosim.interface.controller import controller_parameters
-from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.run.plan import make_plan
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.scenario.reading import load_scenario

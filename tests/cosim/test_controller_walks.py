@@ -11,7 +11,7 @@ import pytest
 from gains import make_gains
 
 from hexapod_cosim.controller import SWITCHES
-from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot

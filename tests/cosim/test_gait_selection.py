@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gains import make_gains
 
-from hexapod_cosim.cosim.results.gait_choice import gait_differences
+from hexapod_cosim.cosim.results.facts import gait_differences
 from hexapod_cosim.cosim.run.gait_selection import GaitSelection, select_gait
 from hexapod_cosim.cosim.run.plan import make_plan
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table

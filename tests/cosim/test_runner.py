@@ -27,7 +27,7 @@ from hexapod_cosim.cosim.master.native_loop import NativeMaster
 from hexapod_cosim.cosim.master.recorder import Recorder
 from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.summary import REFUSED, Summary, summarise
 from hexapod_cosim.cosim.run.plan import make_plan
 from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant

@@ -14,7 +14,7 @@ import tomlkit
 
 from hexapod_cosim.controller import SWITCHES, Controller, Parts, make_gait
 from hexapod_cosim.cosim.run.gait_selection import known_robot
-from hexapod_cosim.cosim.scenario.bundled import list_scenarios
+from hexapod_cosim.cosim.scenario import list_scenarios
 from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table, scenario_robot
 from hexapod_cosim.cosim.scenario.records import Variation
 from hexapod_cosim.models import RobotError, ScenarioError

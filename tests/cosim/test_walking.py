@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Controller, Measurement, make_gait
 from hexapod_cosim.cosim.run.runner import Runner
-from hexapod_cosim.cosim.scenario.bundled import list_scenarios
+from hexapod_cosim.cosim.scenario import list_scenarios
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_robot
 from hexapod_cosim.cosim.scenario.records import Command

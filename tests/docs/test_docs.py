@@ -277,7 +277,7 @@ def compiled_scale(tree: Path, *, law: int, restitution: float) -> float:
             for name in (
                 "contact_law.c",
                 "elementary.c",
-                "checksum.c",
+                "shared.c",
                 "message.c",
                 "ground/soil.c",
                 "ground/surface.c",

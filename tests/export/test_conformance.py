@@ -17,7 +17,7 @@ import pytest
 from lxml import etree
 
 from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
-from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.models import list_robots, load_robot
 
 STANDARD_HEADER = re.compile(r"fmi[23](Functions|FunctionTypes|TypesPlatform|PlatformTypes)\.h")

@@ -25,7 +25,7 @@ from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.sensors import MEASURED
 from hexapod_cosim.cosim.master.signals import COMMANDED, COMMANDS
-from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.models import LEG_NAMES, FmuError, HexapodError, load_robot
 
 

@@ -14,8 +14,9 @@ import tomlkit
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.report.relief import write_heights
+from hexapod_cosim.cosim.results.support import body_height
 from hexapod_cosim.cosim.results.warnings import off_map_warnings, overlap_warnings
-from hexapod_cosim.cosim.results.window import body_height
+from hexapod_cosim.cosim.run.plant import provide_grid
 from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table, scenario_robot
 from hexapod_cosim.models import LEG_NAMES, ScenarioError
 from hexapod_cosim.models.ground.grid_file import grid_bytes
@@ -88,7 +89,7 @@ def test_a_wrong_ground_is_refused_with_its_key(overrides: list[str], message: s
 def test_an_opened_fmu_gets_each_grid_once(athena_fmu: Path) -> None:
     stairs, wave = (grid_bytes(make_surface(name, {})) for name in ("stairs", "wave"))
     with Fmu(athena_fmu) as plant:
-        assert [plant.provide_grid(content) for content in (stairs, wave, stairs)] == [1, 2, 1]
+        assert [provide_grid(plant, content) for content in (stairs, wave, stairs)] == [1, 2, 1]
     with zipfile.ZipFile(athena_fmu) as archive:  # the file itself stays as it is
         assert not [name for name in archive.namelist() if name.endswith(".terrain")]
 

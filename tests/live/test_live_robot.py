@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from hexapod_cosim.controller import BodyCommand, make_gait
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.run.plan import RunPlan
+from hexapod_cosim.cosim.run.plan import RunPlan, chosen_gains
 from hexapod_cosim.cosim.run.plant import initialise_plant
-from hexapod_cosim.cosim.run.preparation import chosen_gains
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table

@@ -1,10 +1,13 @@
-"""Tests the geometry of surfaces against closed forms: planes, paraboloids, spheres, blocks."""
+"""Tests the geometry of surfaces against closed forms, and the smallest concave
+radius of smooth ones.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -15,9 +18,11 @@ from hexapod_cosim.models.ground.faces import ground, ground_height
 from hexapod_cosim.models.ground.smooth import height_and_slopes
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.table import make_surface
+from hexapod_cosim.models.ground.valleys import Valley, tightest_valley
 from hexapod_cosim.models.kinematics import body_states
-from hexapod_cosim.models.records import Array, Terrain
+from hexapod_cosim.models.records import Array, Robot, Terrain
 from hexapod_cosim.models.statics import standing
+from hexapod_cosim.models.validation.bodies import check_settings
 
 PLANE = 1e-12  # m
 STILL, RAISED = np.zeros(3), np.array([0.0, 0.0, 0.2])
@@ -105,3 +110,93 @@ def test_on_uneven_ground_no_foot_begins_deeper_than_on_level_ground() -> None:
     below = level.foot_force[:, 2].max()
     allowed = (below / robot.contact.stiffness) ** (2.0 / 3.0)
     assert 0.0 < depth <= allowed + PLANE
+
+
+# The smallest concave radius of smooth surfaces against closed forms, and what is refused.
+
+ALL = 100.0  # m    a limit that no valley here reaches
+BRUTE = 0.01  # of the radius, of a search with places 1/30 cell apart
+SMOOTH = ("dune", "pyramid_slope", "ramp", "random_uniform", "wave")  # with a difficulty
+
+
+def rough(seed: int, rows: int = 12, columns: int = 9) -> Surface:
+    """Returns random heights up to 20 mm at nodes 50 mm apart."""
+    height = np.random.default_rng(seed).uniform(0.0, 0.02, (rows, columns))
+    return Surface(kind="smooth", height=height, x0=0.3, y0=-0.2, cell=0.05)
+
+
+def narrowest(surface: Surface, limit: float = ALL) -> Valley:
+    """Returns the valley of the smallest radius, which is below the limit."""
+    valley = tightest_valley(surface, limit)
+    assert valley is not None
+    return valley
+
+
+def standing_on(surface: Surface, name: str = "athena") -> Robot:
+    """Returns a robot on a surface, not yet checked."""
+    return replace(load_robot(name), terrain=Terrain(kind="grid", surface=surface))
+
+
+def test_the_radius_of_a_sine_is_that_of_its_trough() -> None:
+    """A sine of 20 mm height and 0.4 m length has 1/(A k^2) = 202.642 mm; the error falls with the
+    square of the cell.
+    """
+
+    def sine(cell: float) -> Valley:
+        return narrowest(
+            smooth(lambda x, y: 0.02 * np.sin(2.0 * math.pi / 0.4 * x) + 0.0 * y, cell, 1.0)
+        )
+
+    coarse, fine = sine(0.01), sine(0.005)
+    assert fine.radius == pytest.approx(0.202642, rel=5e-3)
+    assert 0.2 <= abs(fine.radius - 0.202642) / abs(coarse.radius - 0.202642) <= 0.3
+    assert fine.x % 0.4 == pytest.approx(0.3, abs=0.0051)  # a cell
+
+
+def test_the_radius_of_a_turned_paraboloid_is_that_at_its_bottom() -> None:
+    """Curvatures of 1/50 mm and 1/80 mm, in axes that are turned by 0.6 rad."""
+    cos, sin = math.cos(0.6), math.sin(0.6)
+
+    def bowl(x: Array, y: Array) -> Array:
+        return np.asarray((cos * x + sin * y) ** 2 / 0.1 + (cos * y - sin * x) ** 2 / 0.16)
+
+    valley = narrowest(smooth(bowl, 0.01, 0.25))
+    assert valley.radius == pytest.approx(0.05, rel=1e-9)
+    assert (valley.x, valley.y) == pytest.approx((0.0, 0.0), abs=1e-9)
+
+
+def test_hills_planes_and_blocks_have_no_valley() -> None:
+    dome = smooth(lambda x, y: -(x * x + y * y) / 0.02, 0.01, 0.1)
+    plane = smooth(lambda x, y: 0.3 * x - 0.2 * y, 0.05, 1.0)
+    assert tightest_valley(dome, 0.02) is None  # its hill has a radius of 10 mm
+    assert tightest_valley(plane, 1e6) is None
+    assert tightest_valley(make_surface("stairs", {}), ALL) is None
+
+
+def brute_radius(surface: Surface) -> float:
+    """Returns the smallest radius [m] by eigenvalues of the shape operator at 31 x 31 places inside
+    each cell, 1e-9 cells off its borders.
+    """
+    largest, t = 0.0, np.linspace(1e-9, 1.0 - 1e-9, 31)
+    for row, column, u, v in product(range(surface.rows - 1), range(surface.columns - 1), t, t):
+        x, y = surface.x0 + surface.cell * (column + v), surface.y0 + surface.cell * (row + u)
+        _, slope, hessian = height_and_slopes(surface, x, y)
+        first = np.eye(2) + np.outer(slope, slope)
+        shape = np.linalg.solve(first, hessian) / math.sqrt(1.0 + float(slope @ slope))
+        largest = max(largest, float(np.linalg.eigvals(shape).real.max()))
+    return 1.0 / largest
+
+
+@pytest.mark.parametrize("seed", range(1))
+def test_the_radius_is_that_of_a_search_of_all_places(seed: int) -> None:
+    surface = rough(seed, 6, 5)
+    assert narrowest(surface).radius == pytest.approx(brute_radius(surface), rel=BRUTE)
+
+
+@pytest.mark.parametrize("robot", ["athena", "phantomx_mk4"])
+@pytest.mark.parametrize("name", SMOOTH)
+def test_a_smooth_surface_of_the_catalogue_is_accepted_at_every_difficulty(
+    robot: str, name: str
+) -> None:
+    for difficulty in (0.0, 0.2, 1.0):
+        check_settings(standing_on(make_surface(name, {"difficulty": difficulty}), robot))

@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 from disguised_urdf import random_robot
 
-from hexapod_cosim.cosim.export.robot_files import FORMATS, export_description
+from hexapod_cosim.cosim.cli.exporting import FORMATS, export_description
 from hexapod_cosim.models import LEG_NAMES, Robot, foot_positions, list_robots, load_robot
 from hexapod_cosim.models.dynamics import mass_matrix, masses
 from hexapod_cosim.models.ground.faces import ground_normal

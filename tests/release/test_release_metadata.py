@@ -18,7 +18,7 @@ import pytest
 import yaml
 
 from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
-from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.models import load_robot
 
 ROOT = Path(__file__).parents[2]

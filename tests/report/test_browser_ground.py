@@ -14,7 +14,7 @@ from browser import FLAGS, Opened, find_chromium, launcher
 from hexapod_cosim.cosim.report.writing import write_report
 from hexapod_cosim.cosim.results.folder import StoredResult, stored_result
 from hexapod_cosim.cosim.results.footprints import find_footprints
-from hexapod_cosim.cosim.results.window import GRID
+from hexapod_cosim.cosim.results.support import GRID
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import LEG_NAMES

@@ -20,7 +20,7 @@ from hexapod_cosim.cosim.report import writing
 from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
 from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs
 from hexapod_cosim.cosim.results.drop import Bounce, Drop
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.models.ground.table import make_surface
 

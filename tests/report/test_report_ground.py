@@ -21,14 +21,19 @@ from walks import PARAMETERS, PERIOD, Walk
 
 from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.report.geometry import describe_ground
+from hexapod_cosim.cosim.report.geometry import (
+    MOST_NODES,
+    describe_ground,
+    material_legend,
+    pack_surface,
+)
 from hexapod_cosim.cosim.report.payload import as_json
 from hexapod_cosim.cosim.report.profile import make_profile
-from hexapod_cosim.cosim.report.servos import servo_rows
-from hexapod_cosim.cosim.report.surface import MOST_NODES, material_legend, pack_surface
+from hexapod_cosim.cosim.report.tables import servo_rows
 from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.ground import around_walk, cut, describe_terrain
-from hexapod_cosim.cosim.results.window import GRID, View
+from hexapod_cosim.cosim.results.support import GRID
+from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.models import Terrain
 from hexapod_cosim.models.ground.faces import ground_height, surface_heights
 from hexapod_cosim.models.ground.surface import Surface

@@ -22,7 +22,7 @@ from hexapod_cosim.cosim.results.accuracy import (
     halved_scenario,
     reference_scenario,
 )
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.reading import load_scenario
@@ -177,7 +177,7 @@ def test_an_interrupt_of_the_check_leaves_whole_results_without_it(
     def struck(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hexapod_cosim.cosim.cli.accuracy_check.run_batch", struck)
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.running.run_batch", struck)
     quick = settings("duration=0.2", "outputs.plots=false")
     code, _, err = call(*command, "stand", "-o", tmp_path / "out", "--check-accuracy", *quick)
     assert code == 130

@@ -12,7 +12,7 @@ import pytest
 from scipy import stats
 
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED
-from hexapod_cosim.cosim.report.writing import about, comparison_rows
+from hexapod_cosim.cosim.report.tables import about, comparison_rows
 from hexapod_cosim.cosim.results.comparison import (
     BETTER,
     SAME,
@@ -20,12 +20,15 @@ from hexapod_cosim.cosim.results.comparison import (
     Change,
     change_of,
     compare_runs,
+)
+from hexapod_cosim.cosim.results.metric_table import METRICS
+from hexapod_cosim.cosim.results.side_by_side import (
+    Comparisons,
+    compare_all,
     read_seeds,
     write_seeds,
 )
-from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
-from hexapod_cosim.cosim.results.uncertainty import Comparisons, compare_all
 from hexapod_cosim.models import HexapodError
 
 ROUNDING = 1e-12

@@ -1,4 +1,6 @@
-"""The footprints that reports draw are those that the plant keeps."""
+"""Tests the footprints that reports draw, and the centres of the feet that foot
+errors are computed from.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +15,12 @@ from states import changed
 
 from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.footprints import find_footprints, sinkage_warnings
+from hexapod_cosim.cosim.results.support import SLOPE, feet_of_angles, real_feet
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
-from hexapod_cosim.models import load_robot
+from hexapod_cosim.models import foot_positions, load_robot
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.soil.presets import soil_preset
@@ -108,3 +112,51 @@ def test_the_walk_on_sand_stays_above_its_pads_radius_and_a_sphere_does_not() ->
         result = simulate(load_scenario("sand", overrides=["duration=3", *settings]))
         warnings = result.facts.warnings
         assert any("sinks too deep" in warning for warning in warnings) == warned
+
+
+# The centres of the feet that foot errors are computed from, on planes and on surfaces.
+
+NEEDS_FEET = pytest.mark.usefixtures("plant_build")
+
+JOINTS = ("coxa", "femur", "tibia")
+DRIFT = 1e-6  # m  of the joints' constraints in a walk
+
+
+def walked(*overrides: str) -> Result:
+    """Walks for some cycles."""
+    return simulate(load_scenario("walk_flat", overrides=["duration=4", *overrides]))
+
+
+@NEEDS_FEET
+def test_centres_from_angles_are_the_kinematics_of_the_robot() -> None:
+    result = walked()
+    robot, recording = load_robot("athena"), result.outcome.judged
+    centres = feet_of_angles(recording, result.parameters)
+    for row in (0, 250, 700):
+        angle = np.array(
+            [
+                [recording.column(f"{leg.name}.{joint}.angle")[row] for joint in JOINTS]
+                for leg in robot.legs
+            ]
+        )
+        assert centres[row] == pytest.approx(foot_positions(robot, angle), abs=1e-14)
+
+
+@NEEDS_FEET
+def test_on_a_plane_both_ways_give_the_same_centres() -> None:
+    for ground in ([], ["terrain.kind=slope", "terrain.incline=0.1", "terrain.heading=0.4"]):
+        result = walked(*ground)
+        centres = feet_of_angles(result.outcome.judged, result.parameters)
+        assert np.abs(real_feet(result.outcome.judged, result.parameters) - centres).max() < DRIFT
+
+
+@NEEDS_FEET
+def test_on_a_surface_the_centres_are_a_radius_above_the_ground_along_its_normal() -> None:
+    result = walked("terrain.kind=plane", "terrain.slope_x=0.1")
+    recording, parameters = result.outcome.judged, result.parameters
+    # the same ground as a slope, whose normal is known
+    slope = {"terrain.kind": float(SLOPE), "terrain.incline": float(np.arctan(0.1))}
+    known = real_feet(recording, {**parameters, **slope})
+    assert np.abs(real_feet(recording, parameters) - known).max() < DRIFT
+    upright = real_feet(recording, {**parameters, "terrain.kind": 1.0})
+    assert np.abs(upright - known).max() > 1e-3  # what the vertical instead would give

@@ -11,8 +11,9 @@ from walks import PERIOD, SPEED, WEIGHT, H, Walk
 
 from hexapod_cosim.cosim.common.files import to_json
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.results.metrics import shown_metrics
-from hexapod_cosim.cosim.results.window import body_height, commanded_path, held_integral
+from hexapod_cosim.cosim.results.metric_table import shown_metrics
+from hexapod_cosim.cosim.results.support import body_height
+from hexapod_cosim.cosim.results.window import commanded_path, held_integral
 
 PER_METRE = (
     "slip_per_metre",

@@ -14,8 +14,8 @@ from gains import make_gains
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.master.recorder import Peaks, Recording
+from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.metrics import compute_metrics
-from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate

@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 import pytest
 from test_measured_servos import with_servo
 
-from hexapod_cosim.cosim.export.robot_files import FORMATS, left_out
+from hexapod_cosim.cosim.cli.exporting import FORMATS, left_out
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.mjcf import robot_to_mjcf
 

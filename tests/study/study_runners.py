@@ -17,7 +17,7 @@ import numpy as np
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.master.loop import COMPLETED, INTERRUPTED, Progress
-from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.cosim.scenario.records import Scenario
 

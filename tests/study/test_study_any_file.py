@@ -21,7 +21,7 @@ from hexapod_cosim.extensions.study.runs import Sweep
 from hexapod_cosim.extensions.study.store import columns_of
 from hexapod_cosim.models import HexapodError
 
-SEEDS, FILES = 3, 60  # files per seed, of which one in fourteen is a study
+SEEDS, FILES = 2, 60  # files per seed, of which one in fourteen is a study
 CHANGES = 3  # to a file, at most
 NAN, INF = float("nan"), float("inf")
 # fmt: off

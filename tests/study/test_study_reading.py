@@ -78,7 +78,6 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
         ({"points": 4}, ["points", "got 4", "leave it out"]),
         ({"factors": {"friction.my": [0.3]}}, ["factors.friction.my", "did you mean"]),
         ({"factors": {"friction.mu": [-0.3]}}, ["factors.friction.mu", "got -0.3", ">= 0"]),
-        ({"factors": {"friction.mu": {"uniform": [0.9, 0.1]}}}, ["lower end first"]),
         (
             {"factors": {"friction.mu": {"uniform": [0.1, 0.9]}}},
             ["a distribution in a design 'grid'", "points = 100"],
@@ -89,10 +88,6 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
         (
             {"factors": {"gains.hold.path_rate": [1.0]}, "controls": ["kinematic"]},
             ["a gain that no run has", 'add "compliant"'],
-        ),
-        (
-            {"factors": {"friction.mu": {"values": [1.0], "relative": True}}},
-            ["a relative factor that is no gain"],
         ),
         (
             {"design": "list", "factors": {"friction.mu": [0.1, 0.2], "command.vx": [0.1]}},
@@ -107,11 +102,6 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
             {"set": {"friction.mu": 0.5}, "factors": {"friction.mu": [0.3]}},
             ["set.friction.mu", "set and varied", "take one of them away"],
         ),
-        (
-            {"scenario": "walk_falt"},
-            ["test.toml: scenario", "unknown scenario", "did you mean 'walk_flat'"],
-        ),
-        ({"set": {"friction.mu": -1}}, ["set.friction.mu", "got -1"]),
         (
             optimisation(metric="slip_per_meter"),
             ["optimise.metric", "did you mean 'slip_per_metre'"],
@@ -133,16 +123,10 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
             ["optimise.training.scenarios", "missing key", 'scenarios = ["walk_flat"]'],
         ),
         (
-            optimisation(held_out={"scenarios": ["ripple", "walk_flat"]}),
-            ["trained on", "got ['walk_flat']", "name other scenarios"],
-        ),
-        (
             {"factors": {"gains.hold.path_rate": [math.nan]}},
             ["factors.gains.hold.path_rate[0]", "got nan", "finite number"],
         ),
-        ({"factors": {"gains.hold.path_rate": [-1.0]}}, ["not a gain's value", "got -1.0", ">= 0"]),
         ({"factors": {"gains.hold.ground_time": [0.0]}}, ["not a gain's value", "got 0.0", "> 0"]),
-        ({"seeds": [10**20]}, ["seeds[0]", "64 bits"]),
         ({"seeds": {"first": 2**63 - 2, "count": 5}}, ["seeds.first", "<="]),
         (
             {"factors": {"friction.mu": [0.3], "friction": {"mu": [0.4]}}},
@@ -157,28 +141,14 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
             {"factors": {"torso.mass": {"values": [2.7], "unit": "kg"}}},
             ["factors.torso.mass", "got '2.7 kg'", "plain numbers"],
         ),
-        ({"factors": {"contact.law": ["hertz", "herz"]}}, ["factors.contact.law", "herz"]),
         (
             {"design": "sobol", "points": 4, "factors": {"robot": ["athena", "athana"]}},
             ["factors.robot", "did you mean 'athena'"],
         ),
         (
-            {"design": "random", "points": 4, "factors": {"friction.mu": {"normal": [0.1, 0.5]}}},
-            ["factors.friction.mu", "got -0.4"],
-        ),
-        (
             {"factors": {f"torso.inertia[{k}]": {"linspace": [1, 2, 10**6]} for k in range(3)}},
             ["too many runs", "2e+18", "10,000,000"],
         ),
-        (
-            optimisation(
-                trials=10**5,
-                training={**TRAINING, "seeds": 5000},
-                held_out={"scenarios": ["ripple"], "seeds": [9999]},
-            ),
-            ["too many runs", "split"],
-        ),
-        ({"set": {"seed": 3}}, ["set.seed", "not a setting", "seeds = 10"]),
         (
             {"set": {"outputs": {"plots": True}}},
             ["set.outputs.plots", "not a setting", "no recordings"],
@@ -194,7 +164,7 @@ def test_a_mistake_is_named_with_its_place_and_a_fix(
 ) -> None:
     with pytest.raises(HexapodError) as refused:
         study_of(table)
-    for part in ["test.toml" if "scenario" not in table else "scenario", *parts]:
+    for part in ["test.toml", *parts]:
         assert part in str(refused.value)
 
 

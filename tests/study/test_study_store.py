@@ -1,7 +1,9 @@
-"""The store of a study: no run is lost or damaged by kills, and its rows are always the same."""
+"""Tests the store of a study, and the metadata of result files."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import random
 import signal
@@ -9,12 +11,15 @@ import subprocess
 import time
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from command import COMMAND
+from gains import make_gains
 from studies import (
     KINEMATIC,
     SMALL,
@@ -31,13 +36,14 @@ from study_runners import Counting, Slow
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.extensions.study import store as store_module
 from hexapod_cosim.extensions.study.folder import MANIFEST, RESULTS, export_runs, locked
-from hexapod_cosim.extensions.study.reading import load_study
+from hexapod_cosim.extensions.study.reading import load_study, study_from_table
 from hexapod_cosim.extensions.study.records import StudyError
 from hexapod_cosim.extensions.study.store import RUNS, Store
 from hexapod_cosim.extensions.study.study import Options, run_study
 from hexapod_cosim.extensions.study.summary import read_results
+from hexapod_cosim.models import load_robot
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).parents[2]
 TIMEOUT = 180.0  # s    for what takes some seconds on an idle machine
 MANY_RUNS: dict[str, Any] = {
     **KINEMATIC,
@@ -229,3 +235,51 @@ def test_progress_counts_new_runs_and_those_that_did_not_walk(
     run_study(study, tmp_path, options=options, start=start)
     assert begun == [(4, 0), (4, 4)]
     assert counts == [4, 2]
+
+
+# The metadata of result files say what made them, whoever ran it.
+
+TABLE: dict[str, Any] = {
+    "title": "Größe",
+    "seeds": [3, 8],
+    "factors": {"friction.mu": [0.3, 0.6], "scenario": ["walk_flat", "turn"]},
+}
+
+
+def read_facts(path: Path) -> dict[str, str]:
+    found = pq.read_metadata(path).metadata
+    return {
+        name.decode().removeprefix("hexapod."): text.decode()
+        for name, text in found.items()
+        if name.startswith(b"hexapod.")
+    }
+
+
+def test_a_file_by_itself_holds_the_study_its_scenarios_seeds_versions_and_gains(
+    athena_fmu: Path, tmp_path: Path
+) -> None:
+    study, gains = study_of(TABLE), make_gains(load_robot("athena"))
+    run_quietly(study, tmp_path / "out", fmu=athena_fmu, gains=gains)
+    facts = read_facts(tmp_path / "out" / RESULTS)
+    again = study_from_table(
+        json.loads(facts["study"]),
+        where="results.parquet",
+        scenarios=json.loads(facts["scenarios"]),
+    )
+    assert (again.factors, list(again.seeds), again.controls, again.title) == (
+        study.factors,
+        [3, 8],
+        study.controls,
+        "Größe",
+    )
+    assert {name: case.table for name, case in again.cases.items()} == {
+        name: case.table for name, case in study.cases.items()
+    }
+    assert (json.loads(facts["seeds"]), facts["runs"]) == ([3, 8, 2], "16")
+    assert json.loads(facts["fmus"]) == {
+        "athena": hashlib.sha256(athena_fmu.read_bytes()).hexdigest()
+    }
+    assert json.loads(facts["environment"])["numpy"] == np.__version__
+    hold = asdict(gains)["hold"]
+    assert json.loads(facts["gains"])["hold"] == hold
+    assert facts["gains_sha256"] == hashlib.sha256(facts["gains"].encode()).hexdigest()

@@ -246,7 +246,9 @@ class Plant:
         """
         event = ct.c_int()
         self._check(
-            self.core.hx_plant_step_to_event(self.handle, inputs(command), t_end, stop, event)
+            self.core.hx_plant_step_to_event(
+                self.handle, inputs(command), t_end, stop, ct.byref(event)
+            )
         )
         return bool(event.value)
 

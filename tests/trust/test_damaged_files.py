@@ -19,7 +19,7 @@ from grids import BLOCKS, SMOOTH, Ground, grid_bytes
 from hexapod_cosim.cosim.common.own_process import ProcessEndedError, call_in_process
 from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
 from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
-from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.models import FmuError, load_robot
 
 LOADED, EXECUTABLE = 1, 1  # PT_LOAD and PF_X of an ELF segment

@@ -9,13 +9,10 @@ import signal
 import stat
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
-from hexapod_cosim.cosim.common import files
-from hexapod_cosim.cosim.common import temporary as temporaries
 from hexapod_cosim.cosim.common.files import atomic_path, write_text
 from hexapod_cosim.cosim.results.folder import results_folder
 from hexapod_cosim.models import HexapodError
@@ -88,50 +85,6 @@ def test_the_lock_is_of_the_folder_and_leaves_no_file(tmp_path: Path, temporary:
     assert list(temporary.iterdir()) == []
     assert not list(elsewhere.glob("*.lock"))
     process.stdout.close()
-
-
-def test_the_unpacked_folder_of_a_killed_process_is_deleted_by_the_next(
-    tmp_path: Path, temporary: Path
-) -> None:
-    process = holder(tmp_path / "out", temporary)
-    assert process.stdout is not None
-    left = Path(process.stdout.readline().strip())
-    later = left.stat().st_mtime + 1000.0
-    assert temporaries.sweep(now=later) == []  # in use
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    assert temporaries.sweep(now=left.stat().st_mtime) == []  # may not have its lock yet
-    assert temporaries.sweep(now=later) == [left]
-    assert not left.exists()
-    process.stdout.close()
-
-
-COMMANDS = {
-    "simulate": ("simulate", "walk_flat", "--set", "duration=1000"),
-    "compare": ("compare", "walk_flat", "--set", "duration=1000"),
-}
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_a_killed_command_leaves_nothing_that_the_next_does_not_delete(
-    plant_build: Path, tmp_path: Path, temporary: Path, name: str
-) -> None:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "hexapod_cosim.cosim.cli", *COMMANDS[name], "-o", "out"],
-        cwd=tmp_path,
-        env=os.environ | {"TMPDIR": str(temporary)},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    recording = f"*/{files.RUN_FILE}" if name == "compare" else files.RUN_FILE
-    while process.poll() is None and not list((tmp_path / "out").glob(recording)):
-        time.sleep(0.01)
-    process.kill()
-    assert process.wait() == -signal.SIGKILL
-    left = [path for path in temporary.iterdir() if path.name.startswith("hexapod-")]
-    assert left
-    assert temporaries.sweep(now=time.time() + 1000.0)
-    assert list(temporary.iterdir()) == []
 
 
 # Files are written completely or not at all.

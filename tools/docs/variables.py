@@ -8,7 +8,7 @@ from hexapod_cosim.controller import DEFAULT_PERIOD
 from hexapod_cosim.cosim.export.documentation import Row, variable_rows
 from hexapod_cosim.cosim.interface.controller import load_controller_interface
 from hexapod_cosim.cosim.interface.plant import Interface, load_interface
-from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.models import load_robot
 
 HEADINGS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters", "local": "Locals"}

@@ -14,7 +14,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
-from hexapod_cosim.cosim.master.fmu import Fmu, FmuBlock
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_block import FmuBlock
 from hexapod_cosim.cosim.master.recorder import Recording
 
 

@@ -16,7 +16,7 @@ from hexapod_cosim.cosim.common.plant_files import package_version
 from hexapod_cosim.cosim.export.robot_package import CONTROLLER, PLANT, export_package
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.models import load_robot
 from tools.importers.delayed import walk
 from tools.importers.outcome import answers, not_installed, version

@@ -363,10 +363,7 @@ static void ask(const hxControllerModel *model, hxControllerState *state, hxStan
       plan->overspeed |= fabs(output->speed_ref[k][joint]) >= model->leg[k].speed_max;
     hx_leg_solver_speeds(&model->leg[k], &now->pose[k], hx_plane(0.0, 0.0), 1.0, stance->climb[k]);
   }
-  demand.moment = hx_plane_add(demand.moment, hx_scaled(state->compliant.laws.lean, demand.weight));
-  hx_support_shares(feet, &demand, &plan->shares);
-  hx_planned_squeeze_add(&model->laws.squeeze, feet, &demand, state->compliant.adaptation.squeeze,
-                         &plan->shares);
+  hx_compliant_shares(&model->laws, &state->compliant, feet, &demand, &plan->shares);
   hx_compliance_plan(&model->laws.laws, &demand, height, now->feet.rise, plan);
   stance->value = now->value;
   stance->posture = &now->posture;

@@ -2,22 +2,17 @@ import { Color } from "three";
 import plotStyle from "uplot/dist/uPlot.min.css";
 import { Clock } from "./clock";
 import { byId, element } from "./dom";
-import { listenToKeys } from "./keyboard";
 import { footCentres, poseAt } from "./kinematics";
-import type { Panel } from "./panels/panel";
-import { labelTimes, panelMakers } from "./panels/panels";
-import type { Run } from "./panels/run";
-import { Span } from "./panels/span";
+import { type Panel, Span } from "./panels/panel";
+import { labelTimes, panelMakers, type Run } from "./panels/panels";
 import { unpack } from "./recording";
 import { Actor } from "./scene/actor";
-import { Relief } from "./scene/relief";
 import { Stage } from "./scene/stage";
-import { findStances } from "./scene/stances";
-import { unpackSurface } from "./scene/surface";
+import { Relief, unpackSurface } from "./scene/surface";
 import { contourDistance } from "./scene/terrain";
-import { enlargement } from "./scene/trails";
+import { enlargement, findStances } from "./scene/trails";
 import { property, readColours, Theme } from "./theme";
-import { makeWindowButtons, Transport } from "./transport";
+import { listenToKeys, makeWindowButtons, Transport } from "./transport";
 import type { Payload } from "./types";
 
 const LONGEST_FRAME = 0.1; // s    limits the jump after the tab was inactive

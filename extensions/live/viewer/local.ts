@@ -22,7 +22,7 @@ interface Walk {
   /** Pattern, period, duty, step height, touch-down speed. */
   readonly gait: number[];
   readonly limits: Limits;
-  /** Plans of changes to other gaits (extensions/live/gait_change.py); times since the request. */
+  /** Plans of changes to other gaits (extensions/live/settings.py); times since the request. */
   readonly changes: Record<string, Record<"begin" | "end", number> & { limits: Limits }>;
 }
 
@@ -42,10 +42,10 @@ export class LocalLoop extends Listeners implements Connection {
     private readonly setup: StaticSetup,
   ) {
     super();
-    const { first: settings, walks } = setup;
-    const never = { stopped: true, recording: false, recorded: false };
-    const { limits } = walks[settings.gait];
-    this.status = { ...never, settings, wanted: settings, limits, fault: "", paused: false };
+    const { first: settings } = setup;
+    const { limits } = setup.walks[settings.gait];
+    const flags = { stopped: true, paused: false, recording: false, recorded: false };
+    this.status = { ...flags, settings, wanted: settings, limits, fault: "" };
     setTimeout(() => {
       this.tell("world", setup.world);
       this.attempt(() => {
@@ -129,16 +129,14 @@ export class LocalLoop extends Listeners implements Connection {
     const { walks } = this.setup;
     const { begin, end, limits } = walks[status.settings.gait].changes[gait];
     const [since] = this.row().time;
+    const { gait: timing, limits: usual } = walks[gait];
     const change = () => {
-      this.do("gait", ...walks[gait].gait);
+      this.do("gait", ...timing);
       status.settings = { ...status.settings, gait };
     };
     status.limits = limits;
-    const allow = () => Object.assign(status, { limits: walks[gait].limits });
-    this.plan = [
-      [since + begin, change],
-      [since + end, allow],
-    ];
+    this.plan = [[since + begin, change]];
+    this.plan.push([since + end, () => Object.assign(status, { limits: usual })]);
   }
 
   private tellFrame(): void {

@@ -1,14 +1,12 @@
 import plotStyle from "uplot/dist/uPlot.min.css";
 import { byId, element, listenToHelp } from "../../../cosim/viewer/src/dom";
 import { Theme } from "../../../cosim/viewer/src/theme";
-import { Drive } from "./drive";
-import { Keys } from "./keys";
+import { Drive, Keys } from "./drive";
 import type { Connection } from "./link";
 import type { Frame, Setup, World } from "./messages";
 import { Panel } from "./panel";
 import { Plots } from "./plots";
-import { Pusher } from "./push";
-import { View } from "./view";
+import { Pusher, View } from "./view";
 
 const RISE = 0.1; // of the largest height, at a press of a key
 const PACE = 0.05; // of the largest speed, at a press of a key

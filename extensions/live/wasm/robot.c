@@ -70,13 +70,11 @@ static int set_inputs(void *instance, const unsigned *reference, size_t count, c
   return 0;
 }
 
-/* FMI accepts a status of 1, a warning; ours are errors from 1 on. The end of the macro-step is a
- * product, so that times do not drift. */
+/* FMI accepts a status of 1, a warning; ours are errors from 1 on. */
 static int do_step(void *instance, double t, double h, int no_prior_state) {
-  (void)t, (void)no_prior_state;
-  const double end = (double)(steps + 1) * h;
-  const int status = instance == &input ? hx_plant_step(plant, instance, end)
-                                        : hx_controller_step(controller, instance, NULL, end);
+  (void)no_prior_state;
+  const int status = instance == &input ? hx_plant_step(plant, instance, t + h)
+                                        : hx_controller_step(controller, instance, NULL, t + h);
   return status == HX_OK ? 0 : status + 1;
 }
 
@@ -151,9 +149,7 @@ HX_API int hx_page_advance(int count, double vx, double vy, double yaw_rate, dou
 }
 
 /* Changes the control while the robot walks. */
-HX_API int hx_page_control(int control) {
-  return hx_controller_change_control(controller, control);
-}
+HX_API int hx_page_control(int next) { return hx_controller_change_control(controller, next); }
 
 /* Changes the friction coefficient: the plant begins again in its present pose and motion, with
  * which its coordinates begin as well. */

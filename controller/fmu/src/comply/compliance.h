@@ -355,6 +355,12 @@ static inline void actuate(const hxComplianceModel *model, const hxPlan *plan, h
     }
 }
 
+/* Returns the height offsets of the feet [m] (C36), and in *busy whether they are changing. */
+static inline const double *hx_compliance_raised(const hxCompliance *laws, int *busy) {
+  *busy = hx_touchdown_busy(&laws->touchdown);
+  return laws->touchdown.offset;
+}
+
 /* Returns whether a foot on its way down has met the ground, and not a sensor that lies (C51). */
 static inline int hx_compliance_meets(const hxComplianceModel *model, int leg,
                                       const hxCompliance *laws) {

@@ -113,6 +113,16 @@ static inline void hx_compliant_reset(const hxCompliantModel *model, hxCompliant
   hx_load_adaptation_reset(&model->adaptation, &compliant->adaptation);
 }
 
+/* Computes the planned forces of the feet, walking frame (C19, C20, C42). The moment of the demand
+ * becomes that about the measured centre of mass. */
+static inline void hx_compliant_shares(const hxCompliantModel *model, const hxCompliant *compliant,
+                                       const hxPlane feet[HX_LEGS], hxDemand *demand,
+                                       hxShares *shares) {
+  demand->moment = hx_plane_add(demand->moment, hx_scaled(compliant->laws.lean, demand->weight));
+  hx_support_shares(feet, demand, shares);
+  hx_planned_squeeze_add(&model->squeeze, feet, demand, compliant->adaptation.squeeze, shares);
+}
+
 /* ----------------------------------------------------------------------------------- steering */
 
 /* Returns what is added to the commanded velocity a number of periods after the first planned step
@@ -201,9 +211,10 @@ static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegS
       memset(&compliant->hold, 0, sizeof compliant->hold);
   }
   ++compliant->count;
-  const int busy = hx_touchdown_busy(&laws->touchdown);
+  int busy;
+  const double *offsets = hx_compliance_raised(laws, &busy);
   for (int k = 0; k < HX_LEGS; ++k) {
-    const double offset = laws->touchdown.offset[k], raised = offset + compliant->hold.lift[k];
+    const double offset = offsets[k], raised = offset + compliant->hold.lift[k];
     correct(&leg[k], stance->climb[k], raised, output->angle_ref[k]);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       if (busy || compliant->moving)

@@ -1,8 +1,21 @@
 import type { Clock } from "../clock";
 import { element } from "../dom";
-import { type Curve, Panel, type PanelOptions } from "./panel";
-import { hostOf, type Run } from "./run";
-import type { Span } from "./span";
+import type { Recording } from "../recording";
+import type { Relief } from "../scene/surface";
+import type { PackedRun } from "../types";
+import { type Curve, Panel, type PanelOptions, type Span } from "./panel";
+
+/** A run of the report with its unpacked recording. */
+export interface Run {
+  readonly run: PackedRun;
+  readonly recording: Recording;
+  readonly relief: Relief;
+}
+
+/** Returns the element of the page that holds the plots of a section. */
+export function hostOf(section: string): HTMLElement | null {
+  return document.querySelector<HTMLElement>(`[data-panels="${section}"]`);
+}
 
 /** A plot that shows one column of all runs. */
 interface ComparedPlot {

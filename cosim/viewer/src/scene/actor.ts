@@ -4,11 +4,10 @@ import type { Recording } from "../recording";
 import type { Colours } from "../theme";
 import type { PackedRun } from "../types";
 import { Dents } from "./dents";
-import type { Relief } from "./relief";
 import { RobotScene } from "./robot_scene";
-import type { Stance } from "./stances";
+import type { Relief } from "./surface";
 import { Terrain } from "./terrain";
-import { type Shown, Trails } from "./trails";
+import { type Shown, type Stance, Trails } from "./trails";
 
 /** The scene of one run: the robot, the ground, forces and trails at a time. */
 export class Actor {

@@ -8,7 +8,7 @@ import {
   Vector3,
 } from "three";
 import type { PackedFootprint } from "../types";
-import type { Relief } from "./relief";
+import type { Relief } from "./surface";
 
 const LEAST = 0.001; // m    of depth; a smaller dent is not drawn
 const LIFT = 0.0012; // m    of a dent above the ground, which would hide it

@@ -10,7 +10,7 @@ import {
   Vector3,
 } from "three";
 import type { Colours } from "../theme";
-import { planeNormal, type Relief } from "./relief";
+import { planeNormal, type Relief } from "./surface";
 
 const SIZE = 24; // m    of the drawn plane; fog hides its edge
 const TILE = 0.5; // m    of the grid's texture

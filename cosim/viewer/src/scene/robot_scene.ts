@@ -4,8 +4,8 @@ import type { Colours } from "../theme";
 import type { Robot } from "../types";
 import { ForceArrows } from "./arrows";
 import { Floor } from "./ground";
-import type { Relief } from "./relief";
 import { RobotModel } from "./robot";
+import type { Relief } from "./surface";
 import { Terrain } from "./terrain";
 
 const LAMP = new Vector3(0.9, 1.3, 2.6); // m    position of the lamp relative to the robot

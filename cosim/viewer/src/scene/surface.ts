@@ -1,5 +1,6 @@
+import { Vector3 } from "three";
 import { inflate } from "../recording";
-import type { Material, PackedSurface } from "../types";
+import type { Ground, Material, PackedSurface } from "../types";
 
 /** Height [m] of a smooth surface and its slopes along x and y. */
 export interface Place {
@@ -80,7 +81,7 @@ export function clamp(value: number, low: number, high: number): number {
   return Math.min(Math.max(value, low), high);
 }
 
-/** Unpacks what cosim/report/surface.py has packed. */
+/** Unpacks what cosim/report/geometry.py has packed. */
 export async function unpackSurface(packed: PackedSurface): Promise<Surface> {
   const { rows, columns } = packed;
   const size = rows * columns;
@@ -92,4 +93,46 @@ export async function unpackSurface(packed: PackedSurface): Promise<Surface> {
   const height = Float32Array.from(steps, (step) => packed.low + packed.step * step);
   const material = packed.material ? await inflate(packed.material) : new Uint8Array();
   return new Surface(packed, height, material);
+}
+
+/** The ground of a run, a plane or a surface: its height and normal at each position. */
+export class Relief {
+  constructor(
+    readonly plane: Ground,
+    readonly surface?: Surface,
+  ) {}
+
+  /** Returns the world height of the ground at a position [m]. */
+  height(x: number, y: number): number {
+    const { height, rise, heading } = this.plane;
+    if (this.surface) return height + this.surface.at(x, y).height;
+    return height + rise * (x * Math.cos(heading) + y * Math.sin(heading));
+  }
+
+  /** Returns the unit normal of the ground at a position [m]; upward on a block. */
+  normal(x: number, y: number): Vector3 {
+    if (!this.surface) return planeNormal(this.plane);
+    const { slopeX, slopeY } = this.surface.at(x, y);
+    return new Vector3(-slopeX, -slopeY, 1).normalize();
+  }
+
+  /**
+   * Returns where the mark of a foot is drawn: on the ground below its centre. A foot beside a wall
+   * or on an edge leaves its mark at its own lowest point.
+   */
+  mark(foot: Vector3, radius: number): Vector3 {
+    const height = this.height(foot.x, foot.y);
+    const sole = foot.z - radius;
+    const beside = this.surface && !this.surface.smooth && Math.abs(height - sole) > 0.5 * radius;
+    return new Vector3(foot.x, foot.y, beside ? sole : height);
+  }
+}
+
+/** Returns the unit normal of a plane. */
+export function planeNormal(ground: Ground): Vector3 {
+  return new Vector3(
+    -ground.rise * Math.cos(ground.heading),
+    -ground.rise * Math.sin(ground.heading),
+    1,
+  ).normalize();
 }

@@ -9,8 +9,7 @@ import {
   type WebGLProgramParametersWithUniforms,
 } from "three";
 import type { Colours } from "../theme";
-import { blockGeometry } from "./blocks";
-import { smoothGeometry } from "./smooth";
+import { blockGeometry, smoothGeometry } from "./meshes";
 import type { Surface } from "./surface";
 
 const CONTOURS = 12; // wished between the lowest and the highest place

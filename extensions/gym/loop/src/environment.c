@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "hexapod/message.h"
-#include "random.h"
 
 static const double two_pi = 6.283185307179586;
 
@@ -112,11 +111,28 @@ static int start(const hxEnvFmu *fmu, fmi2Component instance) {
 }
 
 /* ----------------------------------------------------------------------------------------------
- * episodes */
+ * random numbers: functions of seed, episode and place, which do not depend on earlier draws */
 
-static double uniform(const hxEnvironment *environment, int stream, size_t place) {
-  return hx_uniform(environment->seed, environment->episode, (uint64_t)stream, place);
+/* Streams of an episode's random numbers. */
+enum { HX_STREAM_COMMAND, HX_STREAM_DRAWS, HX_STREAM_PUSH };
+
+/* Mixes the bits of a number: the finaliser of SplitMix64 (Steele, Lea and Flood, 2014). */
+static uint64_t mix_bits(uint64_t x) {
+  x += UINT64_C(0x9e3779b97f4a7c15);
+  x = (x ^ (x >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
+  x = (x ^ (x >> 27)) * UINT64_C(0x94d049bb133111eb);
+  return x ^ (x >> 31);
 }
+
+/* Returns a number uniform in [0, 1), a multiple of 2^-53. */
+static double uniform(const hxEnvironment *environment, int stream, size_t place) {
+  const uint64_t own = mix_bits(mix_bits(environment->seed) ^ environment->episode);
+  const uint64_t bits = mix_bits(mix_bits(own ^ (uint64_t)stream) ^ place);
+  return (double)(bits >> 11) * 0x1p-53;
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * episodes */
 
 static void draw_parameters(hxEnvironment *environment) {
   const hxEnvDraws *draws = &environment->settings->draws;

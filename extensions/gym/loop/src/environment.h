@@ -3,7 +3,25 @@
 #define HX_ENVIRONMENT_H
 
 #include "hexapod/environments.h"
-#include "reward.h"
+
+/* The torso's motion in its own axes. */
+typedef struct hxEnvView {
+  double velocity[3]; /* m/s */
+  double rotation[3]; /* rad/s */
+  double gravity[3];  /* 1      direction */
+} hxEnvView;
+
+/* What a step is rewarded for. */
+typedef struct hxEnvMotion {
+  hxEnvView view;        /*        at its end */
+  const double *command; /* m/s, m/s, rad/s  forward, to the left, yaw rate */
+  const double *torque;  /* N m    [HX_ENV_JOINTS] at its end */
+  const double *speed;   /* rad/s  [HX_ENV_JOINTS] at its end */
+  double change;         /* 1      sum of the squared changes of the action */
+  double slip;           /* m      of all feet */
+  double time;           /* s      of the step */
+  int fell;              /* 1: the episode ended with a fall */
+} hxEnvMotion;
 
 typedef struct hxEnvironment {
   const hxEnvSettings *settings;
@@ -44,6 +62,10 @@ void hx_environment_reset(hxEnvironment *environment);
 /* Does one step; writes the weighted terms of the reward and returns their sum. */
 double hx_environment_step(hxEnvironment *environment, const float action[HX_ENV_JOINTS],
                            double term[HX_ENV_TERMS]);
+
+/* Writes the weighted terms of a step (reward.c) and returns their sum. */
+double hx_reward(const hxEnvSettings *settings, const hxEnvMotion *motion,
+                 double term[HX_ENV_TERMS]);
 
 /* Writes the observation of the present state. */
 void hx_environment_observe(const hxEnvironment *environment, float *observation);

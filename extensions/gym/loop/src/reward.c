@@ -1,5 +1,5 @@
 /* reward.c - the terms of the reward. */
-#include "reward.h"
+#include "environment.h"
 
 #include <math.h>
 

@@ -12,13 +12,10 @@ from gains import make_gains
 from hexapod_cosim.controller import Gains, Gait, make_gait
 from hexapod_cosim.cosim.design.stance import StanceDesign, find_stance
 from hexapod_cosim.cosim.export.plant import export_fmu
-from hexapod_cosim.cosim.run import gait_selection, preparation
-from hexapod_cosim.cosim.run.kept_designs import Stance, kept_gains, kept_stance
-from hexapod_cosim.cosim.run.preparation import (
-    PlantFmus,
-    chosen_gains,
-    designed_gains,
-)
+from hexapod_cosim.cosim.run import gait_selection, plant
+from hexapod_cosim.cosim.run.designs import Stance, designed_gains, kept_gains, kept_stance
+from hexapod_cosim.cosim.run.plan import chosen_gains
+from hexapod_cosim.cosim.run.plant import PlantFmus
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, Robot, load_robot
@@ -42,7 +39,7 @@ def designs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[list[De
         return make_gains(load_robot("athena"), period=period)
 
     monkeypatch.setattr("hexapod_cosim.cosim.design.gains.design_for", design)
-    monkeypatch.setattr("hexapod_cosim.cosim.run.kept_designs.user_cache", lambda: tmp_path)
+    monkeypatch.setattr("hexapod_cosim.cosim.run.designs.user_cache", lambda: tmp_path)
     designed_gains.cache_clear()
     yield calls
     designed_gains.cache_clear()
@@ -108,15 +105,15 @@ def test_a_process_packs_the_fmu_of_a_robot_once_and_a_new_binary_anew(
         packed.append(robot.name)
         return export_fmu(robot, path)
 
-    monkeypatch.setattr(preparation, "export_fmu", export)
-    preparation._content.cache_clear()
+    monkeypatch.setattr(plant, "export_fmu", export)
+    plant._content.cache_clear()
     first, second = (PlantFmus(tmp_path / name).fmu("athena") for name in ("a", "b"))
     assert packed == ["athena"]
     whole = export_fmu(load_robot("athena"), tmp_path / "athena.fmu").read_bytes()
     assert first.read_bytes() == second.read_bytes() == whole
     library = tmp_path / "hexapod.so"
     library.write_bytes(b"built later")
-    monkeypatch.setattr(preparation, "binary", lambda *_: library)
+    monkeypatch.setattr(plant, "binary", lambda *_: library)
     PlantFmus(tmp_path / "c").fmu("athena")
     assert packed == ["athena", "athena"]
 
@@ -150,7 +147,7 @@ def test_a_walk_of_an_earlier_process_is_not_designed_again(
         return find_stance(robot, gait=gait)
 
     monkeypatch.setattr(gait_selection, "find_stance", find)
-    monkeypatch.setattr("hexapod_cosim.cosim.run.kept_designs.user_cache", lambda: tmp_path)
+    monkeypatch.setattr("hexapod_cosim.cosim.run.designs.user_cache", lambda: tmp_path)
     plan = load_scenario("stand", overrides=["control=compliant"])
     walks = []
     for _ in range(2):

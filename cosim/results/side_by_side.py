@@ -7,8 +7,10 @@ both robots walked upright to the end and arrived.
 
 from __future__ import annotations
 
+import csv
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -16,17 +18,20 @@ from typing import Any
 import numpy as np
 import tomlkit
 
-from hexapod_cosim.cosim.common.files import PARTS, RUN_FILE, write_json, write_text
+from hexapod_cosim.cosim.common.files import PARTS, RUN_FILE, atomic_text, write_json, write_text
 from hexapod_cosim.cosim.master.loop import COMPLETED
-from hexapod_cosim.cosim.results.balance import Unbalanced
 from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs, judged_pairs
 from hexapod_cosim.cosim.results.folder import METRICS_FILE, SCENARIO
-from hexapod_cosim.cosim.results.metrics import METRICS
-from hexapod_cosim.cosim.results.summary import Summary, described_losses
+from hexapod_cosim.cosim.results.metric_table import METRICS
+from hexapod_cosim.cosim.results.summary import Summary, Unbalanced, described_losses
 from hexapod_cosim.cosim.scenario.controls import AT, reference_of
 from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.models import HexapodError
 
 WALKS = "walks"  # key of run.json
+SEEDS, SEEDS_PARTIAL = "seeds.csv", "seeds.partial.csv"
+FACTS = tuple(item.name for item in fields(Summary) if item.name != "metrics")
+SEPARATOR = " | "  # between the warnings of a run in one cell
 
 
 @dataclass(frozen=True)
@@ -171,3 +176,65 @@ def _mean(values: Sequence[float]) -> float:
     """Returns the mean of the finite values, NaN without any."""
     finite = np.array(values)[np.isfinite(values)]
     return float(finite.mean()) if len(finite) else float("nan")
+
+
+def write_seeds(path: Path, runs: Sequence[Summary]) -> None:
+    """Writes seeds.csv, one line per run with its facts and metrics. The file is never partial."""
+    with atomic_text(path) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*FACTS, *METRICS])
+        for run in runs:
+            facts = [_cell(getattr(run, name)) for name in FACTS]
+            writer.writerow([*facts, *(_cell(run.metrics[name]) for name in METRICS)])
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return SEPARATOR.join(value)
+    return "" if isinstance(value, float) and math.isnan(value) else value
+
+
+def read_seeds(path: Path) -> dict[str, list[Summary]]:
+    """Reads the runs of seeds.csv, by control. Raises HexapodError for a damaged file."""
+    fix = "run `hexapod compare` again"
+    runs: dict[str, list[Summary]] = {}
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            for row in csv.DictReader(file):
+                runs.setdefault(row["control"], []).append(_summary(row))
+    except OSError as error:
+        raise HexapodError(
+            "no runs by seed",
+            got=error.strerror,
+            expected=f"{SEEDS} of a comparison",
+            fix=fix,
+            where=str(path),
+        ) from error
+    except (KeyError, TypeError, ValueError, csv.Error) as error:
+        expected = "a line per run, with all metrics"
+        raise HexapodError(
+            "damaged file",
+            got=f"{type(error).__name__}: {error}",
+            expected=expected,
+            fix=fix,
+            where=str(path),
+        ) from error
+    return runs
+
+
+def _summary(row: Mapping[str, str]) -> Summary:
+    return Summary(
+        control=row["control"],
+        seed=int(row["seed"]),
+        status=row["status"],
+        reason=row["reason"],
+        upright=row["upright"] == str(True),
+        fallback=_number(row["fallback"]) if row["fallback"] else None,
+        warnings=tuple(filter(None, row["warnings"].split(SEPARATOR))),
+        missed=row["missed"],
+        metrics={name: _number(row[name]) for name in METRICS},
+    )
+
+
+def _number(text: str) -> float:
+    return float(text) if text else math.nan

@@ -1,8 +1,38 @@
-#include "hexapod/range_check.h"
-
+/* shared.c - what every component needs: names of statuses, checksums, range checks */
 #include <string.h>
 
 #include "hexapod/message.h"
+#include "hexapod/range_check.h"
+#include "hexapod/status.h"
+
+const char *hx_status_name(hxStatus status) {
+  static const char *const names[] = {
+      [HX_OK] = "ok",
+      [HX_INVALID_ARGUMENT] = "invalid argument",
+      [HX_INVALID_MODEL] = "invalid model",
+      [HX_STEP_TOO_SMALL] = "step too small",
+      [HX_NOT_FINITE] = "not finite",
+      [HX_OUT_OF_MEMORY] = "out of memory",
+      [HX_BAD_STATE] = "bad state",
+  };
+  const unsigned index = (unsigned)status;
+  return index < sizeof names / sizeof names[0] ? names[index] : "unknown status";
+}
+
+/* FNV-1a over little-endian words, the last one padded with zeros. A shift after each product
+ * mixes high bits into low ones, without which changes of sign bits would cancel. Every step is
+ * invertible in the hash and in the word. */
+uint64_t hx_checksum(uint64_t seed, const void *bytes, size_t n) {
+  const unsigned char *byte = bytes;
+  uint64_t hash = seed ^ 0xcbf29ce484222325u;
+  for (size_t i = 0; i < n; i += 8) {
+    uint64_t word = 0;
+    for (size_t k = 0; k < 8 && i + k < n; ++k) word |= (uint64_t)byte[i + k] << (8 * k);
+    hash = (hash ^ word) * 0x100000001b3u;
+    hash ^= hash >> 32;
+  }
+  return (hash ^ n) * 0x100000001b3u;
+}
 
 void hx_check_fail(hxChecker *checker, const char *name, double got, const char *expected) {
   if (checker->status != HX_OK) return;

@@ -13,7 +13,7 @@ import math
 import platform
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
+from functools import cache, lru_cache
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
@@ -28,6 +28,7 @@ from hexapod_cosim.models import HexapodError, Robot
 
 # whose sources make designs
 PACKAGES = ("hexapod_cosim.controller", "hexapod_cosim.cosim.design", "hexapod_cosim.models")
+MAX_DESIGNS = 64  # sets of gains that a process keeps; the least recently used one goes first
 Design = TypeVar("Design")
 
 
@@ -36,6 +37,19 @@ class Stance(NamedTuple):
 
     outward: float  # m    further out from the hips
     deeper: float  # m    below them
+
+
+@lru_cache(maxsize=MAX_DESIGNS)
+def designed_gains(robot: Robot, period: float) -> Gains:
+    """Returns the gains of a robot and a controller period [s].
+
+    They are designed once and kept in the user's cache. Raises GainsError when no gains can be
+    designed.
+    """
+    # imported here: python-control takes a second
+    from hexapod_cosim.cosim.design.gains import design_for  # noqa: PLC0415
+
+    return kept_gains(robot, period, design_for)
 
 
 def kept_gains(

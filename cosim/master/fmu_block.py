@@ -1,0 +1,114 @@
+"""Variables of an FMU, alone and in blocks that one call reads or writes."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.master.fmu_log import WARNING
+from hexapod_cosim.models.errors import FmuError, unknown_name
+
+if TYPE_CHECKING:
+    from hexapod_cosim.cosim.master.fmu import Fmu
+
+SUFFIX = {  # of fmi2Get... and fmi2Set... for each FMI type
+    "Real": "Real",
+    "Integer": "Integer",
+    "Enumeration": "Integer",
+    "Boolean": "Boolean",
+}
+
+
+class StepError(FmuError):
+    """The FMU discarded or refused a step.
+
+    `reached` is the last time [s] for which the FMU's state is valid; NaN when it does not say.
+    """
+
+    def __init__(self, what: str, *, reached: float, **facts: Any) -> None:
+        super().__init__(what, **facts)
+        self.reached = reached
+
+
+@dataclass(frozen=True)
+class FmuVariable:
+    """A variable of an FMU."""
+
+    name: str
+    causality: str
+    real: bool  # whether it is a floating-point variable
+    flag: bool  # whether it is a Boolean variable
+    size: int  # number of elements; 1 for a scalar
+
+
+class FmuBlock:
+    """Variables of one type that are read or written in one call.
+
+    The arguments of the C calls are converted once, here, so that a call allocates nothing.
+
+    `buffer`: a contiguous array for the values, float64 for Reals and int32 for all other types;
+    without one, the block allocates its own.
+    """
+
+    def __init__(
+        self,
+        fmu: Fmu,
+        names: Sequence[str],
+        kind: str,
+        references: Sequence[int],
+        buffer: NDArray[Any] | None,
+    ) -> None:
+        dtype = np.dtype(np.float64 if kind == "Real" else np.int32)
+        values = np.zeros(len(names), dtype) if buffer is None else buffer
+        assert (values.dtype, values.shape) == (dtype, (len(names),)), "not a buffer of these"
+        assert values.flags.c_contiguous, "not a contiguous buffer"
+        self.names, self.values = tuple(names), values
+        self._fmu = fmu
+        numbers = (ctypes.c_uint * len(names))(*references)
+        size, address = ctypes.c_size_t(len(names)), ctypes.c_void_p(values.ctypes.data)
+        self._get = fmu.bind(f"fmi2Get{SUFFIX[kind]}", numbers, size, address)
+        self._set = fmu.bind(f"fmi2Set{SUFFIX[kind]}", numbers, size, address)
+
+    def get(self) -> None:
+        """Reads all values from the FMU. Raises FmuError."""
+        self._call(self._get, "the FMU does not give its outputs")
+
+    def try_set(self) -> int:
+        """Writes all values to the FMU and returns the FMI status."""
+        self._fmu.clear_log()
+        return self._set()
+
+    def set(self) -> None:
+        """Writes all values to the FMU. Raises FmuError."""
+        self._call(self._set, "the FMU does not take its inputs")
+
+    def _call(self, call: Callable[[], int], what: str) -> None:
+        self._fmu.clear_log()
+        status = call()
+        if status > WARNING:
+            raise self._fmu.failure(what, status)
+
+
+def parameter_number(variable: Any, value: Any) -> float:
+    """Returns the number that an FMU takes for a value of a parameter, a variable of fmpy.
+
+    Raises FmuError for a value of another kind.
+    """
+    if isinstance(value, str) and variable.type == "Enumeration":
+        items = {item.name: item.value for item in variable.declaredType.items}
+        if value not in items:
+            raise unknown_name(f"choice for {variable.name}", value, items, error=FmuError)
+        return int(items[value])
+    if not isinstance(value, int | float):
+        raise FmuError(
+            f"parameter {variable.name} is refused",
+            got=value,
+            expected=f"a number [{variable.unit or '1'}]",
+            fix="give a number",
+        )
+    return value
