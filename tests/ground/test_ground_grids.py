@@ -129,7 +129,7 @@ def runner(plant_build: Path) -> Iterator[Runner]:
 @pytest.mark.parametrize("name", WAYS)
 @pytest.mark.parametrize("control", CONTROLS)
 def test_both_controls_walk_it_upright(runner: Runner, name: str, control: str) -> None:
-    result = runner.simulate(load_scenario(name, overrides=["control=compliant"]))
+    result = runner.simulate(load_scenario(name, overrides=[f"control={control}"]))
     walk = result.facts.walk
     assert result.completed
     assert walk.upright
