@@ -273,6 +273,7 @@ fmi2Status fmi2EnterEventMode(fmi2Component c) { return hx_call_enter_event_mode
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo) {
   int changed;
   const int reply = hx_call_update(c, &changed);
+  if (reply != fmi2OK) return reply;
   if (eventInfo) *eventInfo = (fmi2EventInfo){.valuesOfContinuousStatesChanged = changed};
   return reply;
 }
@@ -286,9 +287,11 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
                                        fmi2Boolean *enterEventMode,
                                        fmi2Boolean *terminateSimulation) {
   (void)noSetFMUStatePriorToCurrentPoint;
+  const int reply = hx_call_completed_step(c);
+  if (reply != fmi2OK) return reply;
   if (enterEventMode) *enterEventMode = fmi2False;
   if (terminateSimulation) *terminateSimulation = fmi2False;
-  return hx_call_completed_step(c);
+  return fmi2OK;
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) { return hx_call_set_time(c, time); }

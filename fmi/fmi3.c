@@ -345,13 +345,14 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *discreteStatesN
                                     fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
   int changed;
   const int reply = hx_call_update(c, &changed);
+  if (reply != fmi3OK) return reply;
   set_flag(discreteStatesNeedUpdate, 0);
   set_flag(terminateSimulation, 0);
   set_flag(nominalsOfContinuousStatesChanged, 0);
   set_flag(valuesOfContinuousStatesChanged, changed);
   set_flag(nextEventTimeDefined, 0);
   if (nextEventTime) *nextEventTime = 0.0;
-  return reply;
+  return fmi3OK;
 }
 
 /* ----------------------------------------------------------------------------------------------
@@ -365,9 +366,11 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean noSetFMUState
                                        fmi3Boolean *enterEventMode,
                                        fmi3Boolean *terminateSimulation) {
   (void)noSetFMUStatePriorToCurrentPoint;
+  const int reply = hx_call_completed_step(c);
+  if (reply != fmi3OK) return reply;
   set_flag(enterEventMode, 0);
   set_flag(terminateSimulation, 0);
-  return hx_call_completed_step(c);
+  return fmi3OK;
 }
 
 fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) { return hx_call_set_time(c, time); }

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from hexapod_cosim.cosim.cli.terminal import show_files
+from hexapod_cosim.cosim.cli.options import Json
+from hexapod_cosim.cosim.cli.terminal import show_files, show_json
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.export.plant import export_interface
 from hexapod_cosim.extensions.gym.policy import load_policy, load_policy_interface
@@ -38,25 +39,31 @@ def train_policy(
     minutes: Annotated[float, typer.Option("--minutes", help="Duration.")] = 8.0,
     generations: Annotated[int, typer.Option("--generations", help="At most.")] = 100_000,
     seed: Annotated[int, typer.Option("--seed", help="Of the random numbers.")] = 0,
+    json: Json = False,
 ) -> None:
     """Train a policy into an .npz file; Ctrl-C ends it early with what is learnt."""
     how = TrainSettings(minutes=minutes, generations=generations, seed=seed)
     settings = replace(training_settings(task(env)), robot=robot)
     with atomic_path(output) as part:  # refuses a bad place before the training
-        train(settings, how, _show).save(part)
-    show_files([output])
+        train(settings, how, (lambda _: None) if json else _show).save(part)
+    _show_written(output, json=json)
 
 
 @app.command("bench")
 def measure(
     envs: Annotated[int, typer.Option("--envs", help="Robots in the vector.")] = 64,
     seconds: Annotated[float, typer.Option("--seconds", help="Of robot time.")] = 10.0,
+    json: Json = False,
 ) -> None:
     """Measure environment steps per second, with the error of the path."""
     # imported here because it is needed here only
     from hexapod_cosim.extensions.gym.bench import bench  # noqa: PLC0415
 
-    print(bench(count=envs, duration=seconds))
+    text = bench(count=envs, duration=seconds)
+    if json:
+        show_json({"lines": text.splitlines()})
+    else:
+        print(text)
 
 
 @app.command("export")
@@ -65,10 +72,19 @@ def export(
     output: Output,
     robot: RobotName = "athena",
     fmi: Annotated[int, typer.Option("--fmi", min=2, max=3, help="Version of FMI.")] = 2,
+    json: Json = False,
 ) -> None:
     """Write a policy as a controller FMU."""
     interface = load_policy_interface(load_policy(policy), load_robot(robot))
-    show_files([export_interface(interface, output, fmi=fmi)])
+    _show_written(export_interface(interface, output, fmi=fmi), json=json)
+
+
+def _show_written(path: Path, *, json: bool) -> None:
+    """Prints which file was written."""
+    if json:
+        show_json({"files": [str(path)]})
+    else:
+        show_files([path])
 
 
 def _show(progress: Progress) -> None:
