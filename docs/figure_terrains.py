@@ -15,7 +15,7 @@ from PIL import Image
 from hexapod_cosim.controller.figure_style import DPI, SETTINGS
 from hexapod_cosim.cosim.report.relief import draw_robot, draw_surface
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.ground.catalogue import CATALOGUE, make_surface
+from hexapod_cosim.models.ground.table import CATALOGUE, make_surface
 
 COLUMNS = 5
 COLOURS = 256  # of the picture's palette

@@ -43,7 +43,7 @@ from hexapod_cosim.models.mjcf_ground import APPROXIMATION, add_surface
 from hexapod_cosim.models.records import JOINT_NAMES, Leg, Link, Robot
 from hexapod_cosim.models.servos.motor import back_emf_damping
 from hexapod_cosim.models.urdf.writer import COLOURS, THICKNESS
-from hexapod_cosim.models.xml_elements import add, numbers, written
+from hexapod_cosim.models.xml_elements import add, joined, written
 
 TIME_STEP = 0.001  # s
 # 1  MuJoCo's default: the share of a constraint's acceleration that it corrects
@@ -118,7 +118,7 @@ def _ground(world: ET.Element, robot: Robot) -> None:
 def _contact_attributes(robot: Robot) -> dict[str, str]:
     """Returns the attributes of the ground's contact with the feet."""
     return {
-        "friction": numbers(_friction(robot)),
+        "friction": joined(_friction(robot)),
         "condim": _contact_dimensions(robot),
         "solref": _solref(robot),
         "solimp": _solimp(IMPEDANCE),
@@ -147,12 +147,12 @@ def _contact_dimensions(robot: Robot) -> str:
 def _body_attributes(robot: Robot) -> dict[str, str]:
     """Returns the attributes of torso, knees and shanks: contact without moments, not drawn."""
     contact = _contact_attributes(robot)
-    sliding = {"friction": numbers((_friction(robot)[0], 0.0, 0.0)), "condim": "3"}
+    sliding = {"friction": joined((_friction(robot)[0], 0.0, 0.0)), "condim": "3"}
     return GROUNDED | {"group": "3"} | contact | sliding | {"priority": "2"}
 
 
 def _solimp(impedance: float) -> str:
-    return numbers((impedance, impedance, 0.001, 0.5, 2.0))
+    return joined((impedance, impedance, 0.001, 0.5, 2.0))
 
 
 def _solref(robot: Robot) -> str:
@@ -166,7 +166,7 @@ def _solref(robot: Robot) -> str:
     loss = math.log(max(robot.contact.restitution, 1e-3))
     damping = max(-loss / math.hypot(math.pi, loss), 0.01)
     product = math.sqrt(depth / (load * (1.0 - IMPEDANCE) * tibia_mobility(robot)))
-    return numbers((max(product / damping, 2.0 * TIME_STEP), damping))
+    return joined((max(product / damping, 2.0 * TIME_STEP), damping))
 
 
 def tibia_mobility(robot: Robot) -> float:
@@ -214,7 +214,7 @@ def _torso(world: ET.Element, robot: Robot) -> None:
     torso = add(world, "body", name="torso")
     add(torso, "freejoint", name="torso")
     _inertial(torso, robot.torso.mass, robot.torso.com, robot.torso.inertia)
-    half = numbers(0.5 * size for size in robot.torso.size)
+    half = joined(0.5 * size for size in robot.torso.size)
     add(
         torso,
         "geom",
@@ -227,8 +227,8 @@ def _torso(world: ET.Element, robot: Robot) -> None:
     )
     body = robot.body
     if body.contact == "on" and any(body.torso_box):
-        edges = numbers(half + body.corner_radius for half in body.torso_box)
-        place = numbers(body.torso_centre)
+        edges = joined(half + body.corner_radius for half in body.torso_box)
+        place = joined(body.torso_centre)
         box = {"name": "torso_contact", "type": "box", "size": edges, "pos": place}
         add(torso, "geom", _body_attributes(robot) | box)
     add(torso, "site", name="imu", pos=robot.torso.com)
@@ -264,7 +264,7 @@ def _foot(tibia: ET.Element, leg: Leg, robot: Robot, place: Vector3) -> None:
     """Adds the foot's sphere, which touches the ground only, and its site."""
     sphere = {"name": f"{leg.name}_foot", "type": "sphere", "size": repr(robot.foot.radius)}
     contact = GROUNDED | {"condim": _contact_dimensions(robot), "material": "rubber"}
-    add(tibia, "geom", contact | sphere | {"pos": numbers(place)})
+    add(tibia, "geom", contact | sphere | {"pos": joined(place)})
     add(tibia, "site", name=f"{leg.name}_foot", pos=place)
 
 
@@ -276,7 +276,7 @@ def _tibia_spheres(tibia: ET.Element, leg: Leg, robot: Robot) -> None:
         ("shank", body.shank_radius, body.shank_position),
     ):
         if radius > 0.0:
-            place = numbers(share * value for value in leg.links[-1].tip)
+            place = joined(share * value for value in leg.links[-1].tip)
             sphere = {"name": f"{leg.name}_{name}", "type": "sphere", "size": repr(radius)}
             add(tibia, "geom", _body_attributes(robot) | sphere | {"pos": place})
 
@@ -286,7 +286,7 @@ def _hinge(body: ET.Element, name: str, link: Link, robot: Robot, mobility: floa
     servo = robot.servo
     joint = add(body, "joint", name=name, type="hinge", axis=link.axis)
     joint.attrib |= {
-        "range": numbers((link.angle_min, link.angle_max)),
+        "range": joined((link.angle_min, link.angle_max)),
         "armature": repr(servo.rotor_inertia),
         "frictionloss": repr(servo.coulomb_friction),
     }
@@ -294,10 +294,10 @@ def _hinge(body: ET.Element, name: str, link: Link, robot: Robot, mobility: floa
         joint.set("damping", repr(servo.viscous_friction))
     if servo.stop_stiffness > 0.0:
         # MuJoCo's torque at a depth x is (k x + c dx/dt) / ((1 - d) w), with the impedance d and
-        # the mobility w; negative numbers give k and c
+        # the mobility w; negative joined give k and c
         share = (1.0 - STOP_IMPEDANCE) * mobility
         joint.set(
-            "solreflimit", numbers((-share * servo.stop_stiffness, -share * servo.stop_damping))
+            "solreflimit", joined((-share * servo.stop_stiffness, -share * servo.stop_damping))
         )
         joint.set("solimplimit", _solimp(STOP_IMPEDANCE))
 
@@ -309,8 +309,8 @@ def _servos(root: ET.Element, robot: Robot) -> None:
         for name, link in zip(JOINT_NAMES, leg.links, strict=True):
             joint = f"{leg.name}_{name}"
             position = add(actuator, "position", name=joint, joint=joint, kp=servo.kp, kv=damping)
-            position.set("ctrlrange", numbers((link.angle_min, link.angle_max)))
-            position.set("forcerange", numbers((-servo.torque_max, servo.torque_max)))
+            position.set("ctrlrange", joined((link.angle_min, link.angle_max)))
+            position.set("forcerange", joined((-servo.torque_max, servo.torque_max)))
 
 
 def _stance(root: ET.Element, robot: Robot) -> None:
@@ -328,8 +328,8 @@ def _stance(root: ET.Element, robot: Robot) -> None:
         level = max(ground_height(robot.terrain, x, y) for x, y, _ in feet)
     place = np.array([0.0, 0.0, level]) + height * rotation_matrix(tilt)[:, 2]
     key = add(add(root, "keyframe"), "key", name="stance")
-    key.set("qpos", numbers([*place, *quaternion, *robot.stance.ravel()]))
-    key.set("ctrl", numbers(robot.stance.ravel()))
+    key.set("qpos", joined([*place, *quaternion, *robot.stance.ravel()]))
+    key.set("ctrl", joined(robot.stance.ravel()))
 
 
 def _ground_quaternion(robot: Robot) -> Array:

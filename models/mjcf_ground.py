@@ -10,7 +10,7 @@ import numpy as np
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.xml_elements import add, numbers
+from hexapod_cosim.models.xml_elements import add, joined
 
 BELOW = 0.1  # m    thickness below the lowest height
 MOST_HEIGHTS = 1_000_000  # in a text file
@@ -55,7 +55,7 @@ def _add_field(
     assert asset is not None
     field = add(asset, "hfield", name="ground", nrow=str(surface.rows))
     field.set("ncol", str(surface.columns))
-    field.set("size", numbers((0.5 * (right - left), 0.5 * (high - low), span, BELOW)))
+    field.set("size", joined((0.5 * (right - left), 0.5 * (high - low), span, BELOW)))
     # the first row of the attribute is the one at the largest y
     shares = (surface.height[::-1] - lowest) / span
     field.set("elevation", " ".join(f"{share:.9g}" for share in shares.ravel()))

@@ -43,7 +43,7 @@ def _settings() -> Iterator[tuple[str, str]]:
 
 
 def _surfaces() -> Iterator[tuple[str, str]]:
-    from hexapod_cosim.models.ground.catalogue import CATALOGUE
+    from hexapod_cosim.models.ground.table import CATALOGUE
 
     for name, entry in CATALOGUE.items():
         yield name, entry.about

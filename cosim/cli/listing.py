@@ -54,9 +54,8 @@ def gaits() -> Rows:
 
 def terrains() -> Rows:
     """Returns the kinds of ground with the defaults of their parameters."""
-    from hexapod_cosim.models.ground.catalogue import CATALOGUE
     from hexapod_cosim.models.ground.parameters import DIFFICULTY
-    from hexapod_cosim.models.ground.table import PLACED
+    from hexapod_cosim.models.ground.table import CATALOGUE, PLACED
     from hexapod_cosim.models.records import PLANES
 
     units = {"height": "m", "incline": "rad", "heading": "rad"}

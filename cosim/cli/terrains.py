@@ -15,10 +15,9 @@ from hexapod_cosim.cosim.report.relief import draw_relief, write_heights
 from hexapod_cosim.cosim.scenario.sections import read_terrain_keys
 from hexapod_cosim.cosim.scenario.tables import parse_value
 from hexapod_cosim.models import HexapodError, Terrain, load_robot, unknown_name
-from hexapod_cosim.models.ground.catalogue import CATALOGUE
 from hexapod_cosim.models.ground.parameters import DIFFICULTY, Parameter
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.ground.table import NAMES, PLACED, read_terrain
+from hexapod_cosim.models.ground.table import CATALOGUE, NAMES, PLACED, read_terrain
 from hexapod_cosim.models.records import PLANES
 
 PICTURES = (".png", ".svg")

@@ -52,8 +52,8 @@ from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.grid_file import grid_bytes
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.records import Robot
-from hexapod_cosim.models.validation.ground import check_contact_surface
-from hexapod_cosim.models.validation.robot import check_settings
+from hexapod_cosim.models.validation.bodies import check_settings
+from hexapod_cosim.models.validation.laws import check_contact_surface
 
 FMI_VERSIONS = (2, 3)
 NOTHING: Mapping[str, bytes] = MappingProxyType({})

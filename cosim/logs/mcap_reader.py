@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.logs import messages as ros
-from hexapod_cosim.cosim.logs.mcap_package import require_mcap
 from hexapod_cosim.cosim.logs.mcap_writer import ABOUT, COLUMNS, NANO
+from hexapod_cosim.cosim.logs.messages import require_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import LEG_NAMES, HexapodError
 from hexapod_cosim.models.kinematics import rotation_matrix

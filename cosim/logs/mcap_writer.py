@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.logs import messages as ros
-from hexapod_cosim.cosim.logs.mcap_package import require_mcap
+from hexapod_cosim.cosim.logs.messages import require_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import HexapodError
 from hexapod_cosim.models.kinematics import rotation_matrix

@@ -8,7 +8,9 @@ the definition of each message type, so that a reader needs no ROS installation.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
+from hexapod_cosim.cosim.common.installation import require_packages
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -100,3 +102,11 @@ def field_names(columns: Sequence[str]) -> list[str]:
 def row_definition(columns: Sequence[str]) -> str:
     """Returns the definition of the message that has one float64 field for each column."""
     return "".join(f"float64 {name}\n" for name in field_names(columns))
+
+
+EXTRA, PACKAGES = "logs", ("mcap", "mcap_ros2")
+
+
+def require_mcap(where: str | Path) -> None:
+    """Raises HexapodError, which names the extra, unless MCAP files can be written and read."""
+    require_packages(PACKAGES, "MCAP", extra=EXTRA, where=where)

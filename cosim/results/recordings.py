@@ -21,9 +21,9 @@ import numpy as np
 
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.common.installation import require_pyarrow
-from hexapod_cosim.cosim.logs.mcap_package import require_mcap
 from hexapod_cosim.cosim.logs.mcap_reader import read_mcap
 from hexapod_cosim.cosim.logs.mcap_writer import check_start, write_mcap
+from hexapod_cosim.cosim.logs.messages import require_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.columns import (
     bare_name,

@@ -57,7 +57,7 @@ from hexapod_cosim.models.ground.table import merged_terrain
 from hexapod_cosim.models.records import Terrain
 from hexapod_cosim.models.schema import Number, expect_table, refuse_unknown_keys, require
 from hexapod_cosim.models.servos.presets import changed_servo
-from hexapod_cosim.models.validation.robot import check_settings
+from hexapod_cosim.models.validation.bodies import check_settings
 
 NUMBER = Number(GRAVITY.unit)
 

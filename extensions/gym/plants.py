@@ -23,7 +23,7 @@ from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.table import merged_terrain
 from hexapod_cosim.models.records import Array, Terrain
 from hexapod_cosim.models.statics import settled
-from hexapod_cosim.models.validation.robot import check_settings
+from hexapod_cosim.models.validation.bodies import check_settings
 
 SPACING = 0.02  # m  of the samples
 MARGIN = 0.5  # m  beyond the places that a robot can scan after an episode at its largest speed

@@ -6,7 +6,7 @@ PACKAGE = "hexapod_cosim.extensions.identify"
 REPLAY = Command(
     name="replay",
     about="Drive the plant with a recorded log and compare all readings.",
-    place=f"{PACKAGE}.replay_command:replay",
+    place=f"{PACKAGE}.replay:replay_command",
 )
 IDENTIFY = Command(
     name="identify",

@@ -20,7 +20,7 @@ from hexapod_cosim.cosim.cli.terminal import (
 )
 from hexapod_cosim.cosim.results.folder import results_folder
 from hexapod_cosim.extensions.identify.log import HELD_OUT, read_log
-from hexapod_cosim.extensions.identify.numbers.friction_models import TERMS, with_friction_model
+from hexapod_cosim.extensions.identify.numbers.servo import TERMS, with_friction_model
 from hexapod_cosim.extensions.identify.unknowns import GROUPS
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
 

@@ -12,11 +12,17 @@ from typing import Any
 import tomlkit
 
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
-from hexapod_cosim.extensions.identify.figures import channel_figures
 from hexapod_cosim.extensions.identify.fitting.misfit import EXPLAINED, REJECTED
-from hexapod_cosim.extensions.identify.identified import Estimate, Identified
+from hexapod_cosim.extensions.identify.identify import Estimate, Identified
 from hexapod_cosim.extensions.identify.numbers.servo import GEAR
-from hexapod_cosim.extensions.identify.report import TITLES, Difference, Section, number, rendered
+from hexapod_cosim.extensions.identify.report import (
+    TITLES,
+    Difference,
+    Section,
+    channel_figures,
+    number,
+    rendered,
+)
 from hexapod_cosim.extensions.identify.robot_file import SENSORS, sensors_table, write_robot
 from hexapod_cosim.extensions.identify.screening import left_out
 from hexapod_cosim.extensions.identify.unknowns import BIAS

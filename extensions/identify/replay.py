@@ -1,29 +1,36 @@
-"""Replays a log: drives the FMU with its commands and compares all readings."""
+"""Replays a log: drives the FMU with its commands and compares all readings. Defines the command
+`hexapod replay`.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
+from hexapod_cosim.cosim.cli.options import FmuFile, Json, RobotName
+from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table, waiting, warn
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.results.folder import RESULTS
+from hexapod_cosim.cosim.results.folder import RESULTS, results_folder
 from hexapod_cosim.cosim.results.recordings import write_recording
 from hexapod_cosim.cosim.scenario.records import default_formats
+from hexapod_cosim.cosim.scenario.tables import with_overrides
 from hexapod_cosim.extensions.identify.command_screening import wrong_commands, wrong_commands_error
 from hexapod_cosim.extensions.identify.experiment import Experiment
-from hexapod_cosim.extensions.identify.figures import channel_figures
 from hexapod_cosim.extensions.identify.log import (
     Log,
     LogError,
+    read_log,
     with_speed_references,
     without_readings,
 )
@@ -33,12 +40,13 @@ from hexapod_cosim.extensions.identify.report import (
     Difference,
     Section,
     channel_differences,
+    channel_figures,
     column_differences,
     rendered,
 )
 from hexapod_cosim.extensions.identify.screening import BadColumn, left_out, screened
 from hexapod_cosim.extensions.identify.start import initial_state
-from hexapod_cosim.models import FmuError, Robot
+from hexapod_cosim.models import FmuError, Robot, load_robot
 
 REPLAY, REPORT, KIND = "replay.csv", "report.html", "replay"
 CAPTION = (
@@ -188,3 +196,67 @@ def _page(done: Replay, robot: Robot, command: str, simulated_file: str) -> str:
         facts={"log": done.log.where, "robot": robot.name, "SHA-256 of the robot": robot.hash},
         source=f"{REPLAY} and {simulated_file}",
     )
+
+
+LogFile = Annotated[
+    Path,
+    typer.Argument(metavar="LOG", help="A CSV, Parquet or MCAP file with commands and readings."),
+]
+Parameters = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="NAME=VALUE", help="Set a parameter of the FMU (friction.mu=0.5)."
+    ),
+]
+Folder = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/replay."),
+]
+
+
+def replay_command(
+    log: LogFile,
+    robot: RobotName = "athena",
+    settings: Parameters = None,
+    fmu: FmuFile = None,
+    output: Folder = None,
+    json: Json = False,
+) -> None:
+    """Drive the plant FMU with a recorded log and compare all readings with it."""
+    own = load_robot(robot)
+    parameters = fmu_parameters(settings or [])
+    words = ["hexapod", "replay", str(log), "--robot", robot]
+    words += [word for text in settings or [] for word in ("--set", text)]
+    words += ["--fmu", str(fmu)] if fmu else []
+    recorded = read_log(log, torso_com=own.torso.com)
+    with results_folder(output or Path("out") / "replay") as folder:
+        with waiting("replaying the log"):
+            done = replay(recorded, own, fmu=fmu, parameters=parameters)
+        folder.begin()
+        files = write_replay(done, own, folder.path, command=shlex.join(words), settings=parameters)
+    for text in done.warnings:
+        warn(text.removesuffix("."))
+    if json:
+        channels = [asdict(one) for one in done.channels]
+        written = [str(path) for path in files]
+        show_json({"channels": channels, "warnings": done.warnings, "files": written})
+        return
+    show_table(COLUMNS, [one.as_row() for one in done.channels], right=(2, 3, 4, 5))
+    show_files(files)
+
+
+def fmu_parameters(settings: Sequence[str]) -> dict[str, Any]:
+    """Returns the parameters of the FMU that --set gives, by name. Raises ScenarioError."""
+    found: dict[str, Any] = {}
+
+    def flatten(table: Mapping[str, Any], stem: str) -> None:
+        for key, value in table.items():
+            if isinstance(value, dict):
+                flatten(value, f"{stem}{key}.")
+            else:
+                found[f"{stem}{key}"] = value
+
+    tables = with_overrides({}, settings)
+    flatten(tables.pop("parameters", {}), "")
+    flatten(tables, "")
+    return found

@@ -16,7 +16,7 @@ import tomlkit
 import tomlkit.items
 
 from hexapod_cosim.cosim.common.files import write_text
-from hexapod_cosim.extensions.identify.identified import Estimate, Identified
+from hexapod_cosim.extensions.identify.identify import Estimate, Identified
 from hexapod_cosim.extensions.identify.unknowns import OF_FILE
 from hexapod_cosim.models import JOINT_NAMES, HexapodError, Robot, load_robot
 from hexapod_cosim.models.robot import robot_path

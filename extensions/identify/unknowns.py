@@ -11,9 +11,9 @@ from dataclasses import replace
 
 from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.extensions.identify.log import CHANNELS, SENSORS, Log
+from hexapod_cosim.extensions.identify.numbers import Unknown, section
 from hexapod_cosim.extensions.identify.numbers.bodies import com_row, gyration_row, mass_row
 from hexapod_cosim.extensions.identify.numbers.servo import MOTOR, SERVO
-from hexapod_cosim.extensions.identify.numbers.unknown import Unknown, section
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.friction import BRISTLE_LAWS
 

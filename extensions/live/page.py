@@ -12,7 +12,7 @@ from hexapod_cosim.cosim.report.page import VIEWER, environment, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json
 from hexapod_cosim.extensions.live.settings import FLAT, OWN, Choices
 from hexapod_cosim.models import HexapodError
-from hexapod_cosim.models.ground.catalogue import CATALOGUE
+from hexapod_cosim.models.ground.table import CATALOGUE
 
 TEMPLATE = "live.html.jinja"
 

@@ -18,7 +18,7 @@ from hexapod_cosim.cosim.scenario.reading import scenario_from_table, scenario_r
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Command, Scenario
 from hexapod_cosim.extensions.live.messages import Change, Drive
 from hexapod_cosim.models import Robot, unknown_name
-from hexapod_cosim.models.ground.catalogue import CATALOGUE
+from hexapod_cosim.models.ground.table import CATALOGUE
 
 OWN = "scenario"  # the ground of the scenario
 FLAT = "flat"

@@ -15,10 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
-from hexapod_cosim.models.contact.geometry import FootContact, slip_velocity, sphere_contact
+from hexapod_cosim.models.contact.geometry import (
+    FootContact,
+    contact_shares,
+    slip_velocity,
+    sphere_contact,
+)
 from hexapod_cosim.models.contact.law import Contact, contact_damping, normal_force
 from hexapod_cosim.models.contact.pairs import leg_pairs, pair_contacts
-from hexapod_cosim.models.contact.sharing import contact_shares
 from hexapod_cosim.models.contact.spheres import (
     BodySphere,
     body_contact,
@@ -241,8 +245,8 @@ def closed_contacts(
 ) -> list[tuple[int, Candidate, ContactState, FootContact]]:
     """Returns number, point, state and kinematics of the closed contacts.
 
-    The stiffness of feet is multiplied by the shares of their contacts (sharing.py), which are 1
-    but on blocks.
+    The stiffness of feet is multiplied by the shares of their contacts (`contact_shares`), which
+    are 1 but on blocks.
     """
     found = []
     for k, (point, state) in enumerate(zip(candidates(robot), contacts.states, strict=True)):

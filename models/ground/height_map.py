@@ -1,20 +1,24 @@
 """Makes surfaces of height maps from files: 16-bit PNG, NumPy arrays and ESRI ASCII grids.
 
-The middle of the map comes to (x, y).
+The first row of a picture and of an ASCII grid is the northern one, at the largest y; row 0 of an
+array is at the smallest y, as in `Surface`. The middle of the map comes to (x, y).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError
-from hexapod_cosim.models.ground.map_files import READERS
+from hexapod_cosim.models.files import MAP_SIZE, read_bytes
 from hexapod_cosim.models.ground.parameters import (
     PLATFORM,
     Entries,
@@ -27,6 +31,125 @@ from hexapod_cosim.models.ground.parameters import (
 from hexapod_cosim.models.ground.rough import off_platform
 from hexapod_cosim.models.ground.surface import Surface, check_heights
 from hexapod_cosim.models.schema import Number
+
+NO_MAP = "not a height map"
+ASC_KEYS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize")
+
+
+class HeightFile(NamedTuple):
+    """The heights of a file, from the southern row on, and its scales."""
+
+    units: Array  # (rows, columns) in units of `scale`
+    cell: float  # m    spacing; 0: the file has none
+    scale: float  # m    of a unit; 0: the file has none
+    place: Callable[[int, int], str]  # where (row, column) is in the file, for messages
+
+
+def _refused(path: Path, what: str, got: str, expected: str, fix: str) -> RobotError:
+    """Returns the exception for a file of another content."""
+    return RobotError(what, got=got, expected=expected, fix=fix, where=str(path))
+
+
+def _read_png(path: Path) -> HeightFile:
+    """Returns the grey levels of a picture, which has no scales."""
+    # Pillow takes a moment to import, and few robots have height maps
+    from PIL import Image  # noqa: PLC0415
+
+    try:
+        picture = Image.open(BytesIO(read_bytes(path, MAP_SIZE)), formats=("PNG",))
+        levels, mode = np.asarray(picture).astype(np.float64)[::-1], picture.mode
+    except OSError:
+        if not path.is_file():
+            raise
+        raise _not_grey(path, "a file of another kind, or one that is cut") from None
+    except Exception as error:  # Pillow's readers raise errors of many kinds
+        raise _not_grey(path, f"a damaged file ({error})") from error
+    if mode not in ("I;16", "I;16B", "I"):
+        raise _not_grey(path, f"pixels of the kind {mode}")
+
+    def place(row: int, column: int) -> str:
+        return f"in row {len(levels) - row} from above, column {column + 1}"
+
+    return HeightFile(levels, 0.0, 0.0, place)
+
+
+def _not_grey(path: Path, got: str) -> RobotError:
+    fix = "save the map again as 16-bit greyscale, or give heights in metres as a .npy array"
+    return _refused(path, NO_MAP, got, "PNG with 16 bits of grey per pixel", fix)
+
+
+def _read_npy(path: Path) -> HeightFile:
+    """Returns a NumPy array; floats are in metres, integers have no scale."""
+    with path.open("rb") as file:
+        try:
+            array = np.load(file, allow_pickle=False)
+        except Exception as error:  # the header is Python text: errors of its parser, of memory
+            raise _wrong_array(path, f"{type(error).__name__}: {error}") from error
+    if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu" or array.ndim != 2:
+        shape = f"{getattr(array, 'ndim', 0)} axes of {getattr(array, 'dtype', type(array))}"
+        raise _wrong_array(path, shape)
+    scale = 1.0 if array.dtype.kind == "f" else 0.0
+    return HeightFile(
+        array.astype(np.float64), 0.0, scale, lambda row, column: f"at [{row}, {column}]"
+    )
+
+
+def _wrong_array(path: Path, got: str) -> RobotError:
+    expected = "an array with two axes (rows along +y, columns along +x) of real numbers"
+    return _refused(path, NO_MAP, got, expected, "write it with numpy.save")
+
+
+def _read_asc(path: Path) -> HeightFile:
+    """Returns the heights of an ESRI ASCII grid in metres, and its cellsize [m]."""
+    try:
+        text = read_bytes(path, MAP_SIZE).decode("ascii")
+    except UnicodeDecodeError as error:
+        raise _wrong_grid(path, "bytes that are no text") from error
+    words = text.split()
+    header, begin = dict[str, float](), 0
+    while begin + 1 < len(words) and words[begin][0].isalpha() and _is_number(words[begin + 1]):
+        header[words[begin].lower()] = float(words[begin + 1])
+        begin += 2
+    unknown = sorted(set(header) - {*ASC_KEYS, "nodata_value"})
+    if unknown or not {"ncols", "nrows"} <= set(header):
+        raise _wrong_grid(path, f"the header {', '.join(header) or 'without keys'}")
+    if not all(math.isfinite(header.get(key, 0.0)) for key in ASC_KEYS):
+        raise _wrong_grid(path, "a header with numbers that are not finite")
+    rows, columns = round(header["nrows"]), round(header["ncols"])
+    try:
+        values = np.array(words[begin:], dtype=np.float64)
+    except ValueError as error:
+        raise _wrong_grid(path, str(error)) from error
+    if values.size != rows * columns or rows < 1:
+        raise _wrong_grid(path, f"{values.size} heights for {rows} rows of {columns}")
+    values = np.where(values == header.get("nodata_value", -9999.0), math.nan, values)
+
+    def place(row: int, column: int) -> str:
+        return f"in row {rows - row} of the grid, number {column + 1}"
+
+    return HeightFile(values.reshape(rows, columns)[::-1], header.get("cellsize", 0.0), 1.0, place)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _wrong_grid(path: Path, got: str) -> RobotError:
+    expected = "ncols, nrows, cellsize and then nrows x ncols heights in metres"
+    fix = "export the map again from the tool that made it"
+    return _refused(path, "not an ESRI ASCII grid", got, expected, fix)
+
+
+READERS: dict[str, Callable[[Path], HeightFile]] = {
+    ".png": _read_png,
+    ".npy": _read_npy,
+    ".asc": _read_asc,
+}
+
 
 MAPS: Entries = {}
 

@@ -95,7 +95,7 @@ def plane(values: SimpleNamespace) -> Surface:
     SMOOTH, "Level soil", {"size": SIZE, "horizontal_scale": HORIZONTAL, "soil": SOIL}, tile=False
 )
 def sand(values: SimpleNamespace) -> Surface:
-    """Returns a plane whose material is given by the parameter `soil` (catalogue.py)."""
+    """Returns a plane whose material is given by the parameter `soil` (table.py)."""
     x, y, cell = _nodes(values.size, values.size, values.horizontal_scale)
     return _surface("sand", x, y, cell, np.zeros_like(x))
 

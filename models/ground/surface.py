@@ -99,11 +99,6 @@ class Surface:
     def __hash__(self) -> int:
         return hash(self.digest)
 
-    def contains(self, x: float, y: float) -> bool:
-        """Returns whether a place (x, y) [m] is on the map."""
-        left, right, low, high = self.extent
-        return left <= x <= right and low <= y <= high
-
     def material_at(self, x: float, y: float) -> int:
         """Returns the material at (x, y) [m]: that of the cell, or of the nearest node."""
         if self.material is None:

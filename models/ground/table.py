@@ -1,16 +1,32 @@
-"""Reads the table [terrain] of robot files and scenarios, and merges both."""
+"""Makes surfaces of the catalogue by name, and reads and merges tables [terrain].
+
+Example: `make_surface("stairs", {"step_height": 0.02})`.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from hexapod_cosim.models.errors import RobotError, refuse_path, unknown_name
-from hexapod_cosim.models.ground.catalogue import CATALOGUE, make_surface
-from hexapod_cosim.models.ground.patches import PATCH, read_patches
+from hexapod_cosim.models.ground.curriculum import CURRICULUM
+from hexapod_cosim.models.ground.height_map import MAPS
+from hexapod_cosim.models.ground.parameters import Entries, Entry, read_values, with_defaults
+from hexapod_cosim.models.ground.patches import (
+    PATCH,
+    check_soil,
+    read_patches,
+    with_patches,
+    with_soil,
+)
+from hexapod_cosim.models.ground.rough import SMOOTH
+from hexapod_cosim.models.ground.steps import BLOCKS
+from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.records import PLANES, Terrain
 from hexapod_cosim.models.schema import (
     Choice,
@@ -20,6 +36,109 @@ from hexapod_cosim.models.schema import (
     refuse_unknown_keys,
     specs,
 )
+
+MOST_NODES = 1 << 24  # of a generated surface
+KEPT = 32  # surfaces in the cache
+# in the order of lists
+CATALOGUE: Entries = {
+    name: one for name, one in {**BLOCKS, **SMOOTH, **CURRICULUM, **MAPS}.items() if one.listed
+}
+
+
+def entry_of(name: str, *, where: str | None = None) -> Entry:
+    """Returns a surface of the catalogue. Raises RobotError for an unknown name."""
+    if name not in CATALOGUE:
+        raise unknown_name("surface", name, CATALOGUE, where=where, error=RobotError)
+    return CATALOGUE[name]
+
+
+def make_surface(name: str, given: Mapping[str, Any], *, where: str = "terrain") -> Surface:
+    """Returns a surface of the catalogue. Equal parameters give equal bits.
+
+    Args:
+        name: of the catalogue.
+        given: its parameters that differ from their defaults, and `patch`, a list of tables.
+        where: prefix of keys in messages.
+
+    Raises RobotError.
+    """
+    entry = entry_of(name, where=f"{where}.kind")
+    plain = {key: value for key, value in given.items() if key != "patch"}
+    values = read_values(entry.parameters, plain, where)
+    patches = read_patches(given.get("patch", ()), f"{where}.patch")
+    recipe = {"kind": name, **values, **({"patch": patches} if patches else {})}
+    stamp = _stamp(values)
+    key = tuple(sorted(values.items())), tuple(tuple(sorted(one.items())) for one in patches)
+    return replace(_made(name, *key, stamp, where), recipe=recipe)
+
+
+def _stamp(values: Mapping[str, Any]) -> tuple[int, int]:
+    """Returns time and size of a height map's file, so that a changed file is read again."""
+    try:
+        facts = Path(str(values["file"])).stat()
+    except (KeyError, OSError):
+        return 0, 0
+    return facts.st_mtime_ns, facts.st_size
+
+
+@lru_cache(maxsize=KEPT)
+def _made(
+    name: str,
+    given: tuple[tuple[str, float | str], ...],
+    patches: tuple[tuple[tuple[str, Any], ...], ...],
+    _stamp: tuple[int, int],
+    where: str,
+) -> Surface:
+    """Makes a surface from checked parameters."""
+    entry = CATALOGUE[name]
+    values = with_defaults(entry.parameters, dict(given), where)
+    _check_size(values, where)
+    surface = entry.make(SimpleNamespace(**values))
+    _check_room(surface, values, where)
+    if "soil" in values:
+        check_soil(values["soil"], f"{where}.soil")
+        surface = with_soil(surface, values["soil"])
+    return with_patches(surface, [dict(patch) for patch in patches], where=f"{where}.patch")
+
+
+def _check_size(values: Mapping[str, Any], where: str) -> None:
+    """Raises RobotError for a map of too many or too few heights."""
+    if "size" not in values or "horizontal_scale" not in values:
+        return
+    size, cell = values["size"], values["horizontal_scale"]
+    if not (size / cell) ** 2 <= MOST_NODES or size < 2.0 * cell:
+        what = "size and horizontal_scale of the map do not fit together"
+        got = f"{size:g} m in cells of {cell:g} m"
+        expected = f"2 to {round(MOST_NODES**0.5)} cells along an edge"
+        fix = "change terrain.size or terrain.horizontal_scale"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where)
+
+
+def _check_room(surface: Surface, values: Mapping[str, Any], where: str) -> None:
+    """Raises RobotError where the map has no room beside the platform, or for all steps."""
+    if "platform_size" not in values:
+        return
+    cell, platform = surface.cell, values["platform_size"]
+    begin = cell * math.ceil(0.5 * platform / cell - 1e-9)
+    if begin > surface.extent[1] - 0.5 * cell:
+        what = "the flat platform covers the whole map"
+        got = f"size {values['size']:g} m, platform_size {platform:g} m"
+        expected = f"a size of at least {2.0 * (begin + cell):.6g} m"
+        fix = "enlarge terrain.size, or reduce terrain.platform_size"
+        raise RobotError(what, got=got, expected=expected, fix=fix, where=where)
+    wanted = values.get("num_steps", 0)
+    fit = round(float(surface.height.max()) / values["step_height"]) if wanted else 0
+    if fit < wanted:
+        size = math.ceil(20.0 * (begin + wanted * values["step_width"])) / 10.0
+        raise RobotError(
+            "more steps than the map has room for",
+            got=f"num_steps {wanted} of {values['step_width']:g} m on a map of "
+            f"{values['size']:g} m",
+            expected=f"at most {fit} steps",
+            fix=f"set terrain.size={size:g}, or fewer or narrower steps",
+            where=where,
+        )
+
 
 PLACED = ("height", "incline", "heading")  # keys of every kind
 NAMES = (*PLANES, *CATALOGUE)

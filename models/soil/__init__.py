@@ -1,3 +1,3 @@
-"""Defines soft ground: law.py its forces (eq. 40-46), losses.py its powers, presets.py the measured
+"""Defines soft ground: law.py its forces and powers (eq. 40-46), presets.py the measured
 soils of data/*.toml.
 """

@@ -57,10 +57,8 @@ from hexapod_cosim.models.urdf.assumed import (
     assume_stances,
     equivalent_box,
 )
-from hexapod_cosim.models.urdf.bodies import Body, root_body
-from hexapod_cosim.models.urdf.collision import collision_body
-from hexapod_cosim.models.urdf.elements import DAMPING, Urdf, parse_urdf
-from hexapod_cosim.models.urdf.extension import extension_tables
+from hexapod_cosim.models.urdf.bodies import Body, collision_body, root_body
+from hexapod_cosim.models.urdf.elements import DAMPING, Urdf, extension_tables, parse_urdf
 from hexapod_cosim.models.urdf.legs import FoundLeg, find_legs, inertia_entries
 
 Table = dict[str, Any]

@@ -15,7 +15,7 @@ from hexapod_cosim.models.ground.table import terrain_table
 from hexapod_cosim.models.records import JOINT_NAMES, BodyContact, Leg, Link, Robot, Terrain
 from hexapod_cosim.models.schema import specs
 from hexapod_cosim.models.urdf.elements import EXTENSION
-from hexapod_cosim.models.xml_elements import add, numbers, text, written
+from hexapod_cosim.models.xml_elements import add, joined, text, written
 
 RECORDS = (
     "foot",
@@ -164,4 +164,4 @@ def _terrain(own: ET.Element, terrain: Terrain) -> None:
     for patch in patches:
         values = {key: value for key, value in patch.items() if key != "size"}
         attributes = {key: text(value) for key, value in values.items()}
-        add(element, "patch", attributes | {"size": numbers(patch["size"])})
+        add(element, "patch", attributes | {"size": joined(patch["size"])})

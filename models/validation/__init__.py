@@ -4,7 +4,7 @@ The annotations of the records check single values. A robot with impossible iner
 wrongly, so it is rejected on load.
 """
 
-from hexapod_cosim.models.validation.ground import check_contact_surface
-from hexapod_cosim.models.validation.robot import check_robot, check_settings
+from hexapod_cosim.models.validation.bodies import check_robot, check_settings
+from hexapod_cosim.models.validation.laws import check_contact_surface
 
 __all__ = ["check_contact_surface", "check_robot", "check_settings"]

@@ -1,4 +1,4 @@
-"""Checks the bodies of a robot: inertias, links, limits of joints, rotors and stance."""
+"""Checks a robot as a whole, and its bodies: inertias, links, limits, rotors and stance."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.kinematics import foot_positions, inertia_matrix
 from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES, Leg, Link, Robot
-from hexapod_cosim.models.schema import check_record
+from hexapod_cosim.models.schema import Vector, check_record
+from hexapod_cosim.models.validation.laws import check_laws
 
 # a thin rod satisfies the triangle inequality with equality; rounding to four digits may violate it
 INERTIA_ROUNDING = 1e-3
@@ -162,3 +163,48 @@ def _plane_fit(points: Array) -> tuple[Array, float]:
     columns = np.column_stack([np.ones(len(points)), points[:, :2]])
     plane = np.linalg.lstsq(columns, points[:, 2], rcond=None)[0]
     return points[:, 2] - columns @ plane, float(np.hypot(plane[1], plane[2]))
+
+
+# matter lies within the box; real torsos stay below half of this limit
+GYRATION_PER_DIAGONAL = 1.0
+# sections that do not concern the bodies
+SETTINGS = ("contact", "friction", "servo", "baumgarte", "solver", "terrain", "soil", "body")
+
+
+def check_robot(robot: Robot, *, where: str | None = None) -> None:
+    """Checks a robot. Raises RobotError for the first violated rule.
+
+    where: name of the robot's file for messages.
+    """
+    at = f"{where or robot.name}: "
+    Vector("m/s2", 3).read(robot.gravity, at + "gravity")
+    for name in ("torso", "foot", "gait"):
+        check_record(getattr(robot, name), at + name)
+    check_settings(robot, where=where)
+    check_inertia(
+        robot.torso.mass,
+        robot.torso.inertia,
+        GYRATION_PER_DIAGONAL * math.hypot(*robot.torso.size),
+        at + "torso",
+    )
+    check_com(robot.torso.com, math.hypot(*robot.torso.size), at + "torso")
+    if tuple(leg.name for leg in robot.legs) != LEG_NAMES:
+        expected = "legs " + " ".join(LEG_NAMES)
+        got = [leg.name for leg in robot.legs]
+        fix = "give these six in this order"
+        raise RobotError("wrong legs", got=got, expected=expected, fix=fix, where=at + "legs")
+    for leg in robot.legs:
+        check_leg(leg, f"{at}legs.{leg.name}")
+    check_rotors(robot, at)
+    check_stance(robot, at)
+
+
+def check_settings(robot: Robot, *, where: str | None = None) -> None:
+    """Checks the robot's laws and settings only, for a robot with checked bodies.
+
+    Raises RobotError.
+    """
+    at = f"{where or robot.name}: "
+    for name in SETTINGS:
+        check_record(getattr(robot, name), at + name)
+    check_laws(robot, at)

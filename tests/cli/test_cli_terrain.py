@@ -10,7 +10,7 @@ import pytest
 from command import Call
 from PIL import Image
 
-from hexapod_cosim.models.ground.catalogue import CATALOGUE, make_surface
+from hexapod_cosim.models.ground.table import CATALOGUE, make_surface
 
 
 def test_all_surfaces_are_listed_with_their_parameters(call: Call) -> None:

@@ -14,9 +14,9 @@ from plant import Plant, inputs, pointer
 from states import changed, distance, lopsided, random_bodies, random_command, random_pose
 
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.contact.clearance import clearances, leg_points, line_distance
 from hexapod_cosim.models.contact.forces import contacts_of
 from hexapod_cosim.models.contact.geometry import standing_damping
+from hexapod_cosim.models.contact.pairs import clearances, leg_points, line_distance
 from hexapod_cosim.models.contact.spheres import (
     body_contacts,
     body_forces,

@@ -22,7 +22,7 @@ from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.ground.catalogue import make_surface
+from hexapod_cosim.models.ground.table import make_surface
 from hexapod_cosim.models.records import Array
 
 RUBBLE = ("terrain.kind=rubble", "terrain.max_height=20 mm")
@@ -129,7 +129,7 @@ def runner(plant_build: Path) -> Iterator[Runner]:
 @pytest.mark.parametrize("name", WAYS)
 @pytest.mark.parametrize("control", CONTROLS)
 def test_both_controls_walk_it_upright(runner: Runner, name: str, control: str) -> None:
-    result = runner.simulate(load_scenario(name, overrides=["control=compliant"]))
+    result = runner.simulate(load_scenario(name, overrides=[f"control={control}"]))
     walk = result.facts.walk
     assert result.completed
     assert walk.upright

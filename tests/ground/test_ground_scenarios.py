@@ -19,9 +19,9 @@ from hexapod_cosim.cosim.results.warnings import off_map_warnings, overlap_warni
 from hexapod_cosim.cosim.run.plant import provide_grid
 from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table, scenario_robot
 from hexapod_cosim.models import LEG_NAMES, ScenarioError
-from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.grid_file import grid_bytes
 from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.table import make_surface
 
 GRID = {"terrain.kind": 3.0}
 

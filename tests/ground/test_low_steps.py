@@ -9,7 +9,7 @@ import pytest
 from grids import BLOCKS, CORNER, SIDE, TOP, WALL, Ground, grid_bytes
 from plant import probed
 
-from hexapod_cosim.models.contact.sharing import contact_shares
+from hexapod_cosim.models.contact.geometry import contact_shares
 from hexapod_cosim.models.ground.blocks import FACES, block_face, cell_at
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.records import Array

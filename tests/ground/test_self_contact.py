@@ -16,9 +16,8 @@ from plant import Plant, PlantError
 from states import changed, distance, lopsided, random_command
 
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.contact.clearance import clearances
 from hexapod_cosim.models.contact.forces import open_contacts, pair_wrenches, standing_pairs
-from hexapod_cosim.models.contact.pairs import leg_pairs, pair_contacts
+from hexapod_cosim.models.contact.pairs import clearances, leg_pairs, pair_contacts
 from hexapod_cosim.models.dynamics import (
     Command,
     accelerations,
@@ -31,7 +30,7 @@ from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.integrator import integrate, start_state
 from hexapod_cosim.models.kinematics import body_states
 from hexapod_cosim.models.records import Array
-from hexapod_cosim.models.validation.robot import check_robot
+from hexapod_cosim.models.validation.bodies import check_robot
 
 DENSE = 1e-10  # relative: the error of the dense solution, whose condition number is about 1e6
 FORCES = 1e-12  # relative: rounding of forces

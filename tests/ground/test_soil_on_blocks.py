@@ -19,14 +19,14 @@ from test_twin_motion import FEET, Pair, stood
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.contact.footprints import footprint_depth
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.grid_file import grid_bytes
 from hexapod_cosim.models.ground.patches import material_row
 from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.table import make_surface
 from hexapod_cosim.models.kinematics import foot_centres
 from hexapod_cosim.models.records import Array, Terrain
 from hexapod_cosim.models.soil.presets import soil_preset
-from hexapod_cosim.models.validation.robot import check_settings
+from hexapod_cosim.models.validation.bodies import check_settings
 
 ATHENA = changed(load_robot("athena"), body={"contact": "off"})
 TERRAINS: dict[str, dict[str, Any]] = {

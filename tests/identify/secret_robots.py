@@ -20,7 +20,7 @@ from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.extensions.identify.experiment import JOINTS, Experiment, of_point, readings
 from hexapod_cosim.extensions.identify.log import ATTITUDE, CHANNELS, Log, log_of
 from hexapod_cosim.extensions.identify.log_plant import LogPlant
-from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
+from hexapod_cosim.extensions.identify.numbers import Unknown
 from hexapod_cosim.extensions.identify.unknowns import (
     DELAYS,
     START,

@@ -17,16 +17,19 @@ from hexapod_cosim.extensions.identify.fitting.covariance import (
     spectrum,
     white_information,
 )
-from hexapod_cosim.extensions.identify.fitting.differences import differences
-from hexapod_cosim.extensions.identify.fitting.least_squares import minimised, remaining_step
-from hexapod_cosim.extensions.identify.fitting.rank import (
+from hexapod_cosim.extensions.identify.fitting.least_squares import (
+    differences,
+    minimised,
+    remaining_step,
+)
+from hexapod_cosim.extensions.identify.fitting.misfit import (
     dependences,
     determined,
     sharpened,
     to_keep,
 )
 from hexapod_cosim.extensions.identify.fitting.search import finished, tried
-from hexapod_cosim.extensions.identify.identified import QUANTILE, Estimate
+from hexapod_cosim.extensions.identify.identify import QUANTILE, Estimate
 from hexapod_cosim.extensions.identify.unknowns import ROBOT
 
 Array = NDArray[np.float64]

@@ -20,9 +20,9 @@ from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
 from hexapod_cosim.extensions.identify.experiment import of_point
 from hexapod_cosim.extensions.identify.fitting.misfit import misfits, read_noise
 from hexapod_cosim.extensions.identify.fitting.problem import Problem
-from hexapod_cosim.extensions.identify.identified import Identified
 from hexapod_cosim.extensions.identify.identify import (
     TOLERANCE,
+    Identified,
     identify,
     make_experiment,
     worker_pool,

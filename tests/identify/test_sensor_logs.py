@@ -12,8 +12,7 @@ from scipy.optimize import root
 from secret_robots import secret_robot
 
 from hexapod_cosim.extensions.identify.fitting.search import ENOUGH
-from hexapod_cosim.extensions.identify.identified import QUANTILE
-from hexapod_cosim.extensions.identify.identify import identify
+from hexapod_cosim.extensions.identify.identify import QUANTILE, identify
 from hexapod_cosim.extensions.identify.identify_files import warnings
 from hexapod_cosim.extensions.identify.start import standing_attitude
 from hexapod_cosim.models import Robot, load_robot

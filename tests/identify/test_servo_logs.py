@@ -16,14 +16,17 @@ from secret_robots import NOISE, SEEN, Secret, secret_robot
 from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.extensions.identify.experiment import Experiment
 from hexapod_cosim.extensions.identify.fitting.judging import fit
+from hexapod_cosim.extensions.identify.fitting.misfit import DETERMINED
 from hexapod_cosim.extensions.identify.fitting.problem import Problem
-from hexapod_cosim.extensions.identify.fitting.rank import DETERMINED
-from hexapod_cosim.extensions.identify.identified import Identified
-from hexapod_cosim.extensions.identify.identify import TOLERANCE, identify, make_experiment
+from hexapod_cosim.extensions.identify.identify import (
+    TOLERANCE,
+    Identified,
+    identify,
+    make_experiment,
+)
 from hexapod_cosim.extensions.identify.identify_files import open_text, warnings
 from hexapod_cosim.extensions.identify.log_plant import LogPlant
-from hexapod_cosim.extensions.identify.numbers.friction_models import TERMS, with_friction_model
-from hexapod_cosim.extensions.identify.numbers.servo import GEAR
+from hexapod_cosim.extensions.identify.numbers.servo import GEAR, TERMS, with_friction_model
 from hexapod_cosim.extensions.identify.robot_file import write_robot
 from hexapod_cosim.extensions.identify.unknowns import ROBOT, chosen_unknowns
 from hexapod_cosim.models import JOINT_NAMES, Robot, load_robot

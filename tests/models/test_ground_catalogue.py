@@ -17,7 +17,6 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.models import RobotError, load_robot, robot_from_table
-from hexapod_cosim.models.ground.catalogue import CATALOGUE, make_surface
 from hexapod_cosim.models.ground.curriculum import column_names
 from hexapod_cosim.models.ground.faces import ground_height
 from hexapod_cosim.models.ground.grid_file import (
@@ -29,7 +28,7 @@ from hexapod_cosim.models.ground.grid_file import (
 )
 from hexapod_cosim.models.ground.smooth import height_and_slopes, heights_at
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.ground.table import merged_terrain, terrain_table
+from hexapod_cosim.models.ground.table import CATALOGUE, make_surface, merged_terrain, terrain_table
 from hexapod_cosim.models.mjcf import robot_to_mjcf
 from hexapod_cosim.models.mjcf_ground import rectangles
 from hexapod_cosim.models.records import Array, Terrain
@@ -102,7 +101,7 @@ def test_a_damaged_grid_file_is_refused(damage: Any) -> None:
 
 def test_equal_parameters_give_equal_bits_in_another_process() -> None:
     code = (
-        "from hexapod_cosim.models.ground.catalogue import CATALOGUE, make_surface;"
+        "from hexapod_cosim.models.ground.table import CATALOGUE, make_surface;"
         "print(*(make_surface(n, {}).digest for n in CATALOGUE if n != 'heightfield'))"
     )
     again = subprocess.run(

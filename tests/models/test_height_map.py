@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 
 from hexapod_cosim.models import RobotError, load_robot
-from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.table import make_surface
 from hexapod_cosim.models.records import Array
 
 ATHENA = Path(__file__).resolve().parents[2] / "models" / "athena.toml"

@@ -18,8 +18,8 @@ from hexapod_cosim.cosim.results.support import GRID
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import LEG_NAMES
-from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.table import make_surface
 
 SUNK = 0.012  # m    that feet stand in the drawn ground
 

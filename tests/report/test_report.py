@@ -22,7 +22,7 @@ from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs
 from hexapod_cosim.cosim.results.drop import Bounce, Drop
 from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
-from hexapod_cosim.models.ground.catalogue import make_surface
+from hexapod_cosim.models.ground.table import make_surface
 
 
 def comparison(

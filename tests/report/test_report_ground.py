@@ -35,9 +35,9 @@ from hexapod_cosim.cosim.results.ground import around_walk, cut, describe_terrai
 from hexapod_cosim.cosim.results.support import GRID
 from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.models import Terrain
-from hexapod_cosim.models.ground.catalogue import make_surface
 from hexapod_cosim.models.ground.faces import ground_height, surface_heights
 from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.table import make_surface
 
 ON_GRID = {"terrain.kind": float(GRID), "terrain.height": 0.0, "friction.mu": 0.7}
 SPEED, STEP, ROWS = 0.1, 0.01, 601  # m/s, s: a torso that moves 0.6 m along x in 6 s

@@ -15,7 +15,6 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer
 
-from hexapod_cosim.cosim.logs import mcap_package
 from hexapod_cosim.cosim.logs import messages as ros
 from hexapod_cosim.cosim.logs.mcap_reader import read_mcap, read_topics
 from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
@@ -195,7 +194,7 @@ def test_a_cut_file_is_refused(folder: Path, tmp_path: Path) -> None:
 def test_without_the_extra_the_message_names_it_and_nothing_is_run(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mcap_package, "PACKAGES", ("no_such_package",))
+    monkeypatch.setattr(ros, "PACKAGES", ("no_such_package",))
     folder = tmp_path / "out"
     outcome = call("simulate", "walk_flat", "--format", "mcap", "-o", folder, *QUICK)
     assert_refused(outcome, "MCAP files need", "outputs.formats", "[logs]")

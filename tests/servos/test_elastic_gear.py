@@ -25,7 +25,7 @@ from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.energy import kinetic_energy, potential_energy
 from hexapod_cosim.models.integrator import Start, State, end_step, start_state, try_step
 from hexapod_cosim.models.records import Array
-from hexapod_cosim.models.validation.robot import check_robot
+from hexapod_cosim.models.validation.bodies import check_robot
 
 CLOSED = 1e-8  # rad, rad/s  of closed forms: a tibia's inertia is 1e-7 of its wall's
 AGREES = 1e-6  # of an independent integration

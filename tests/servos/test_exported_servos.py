@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from pathlib import Path
 
 import pytest
 from test_measured_servos import with_servo
@@ -41,8 +40,3 @@ def test_an_ideal_servo_loses_nothing_and_gears_their_play() -> None:
     gears = ["the elasticity of the gears", "backlash", "the rotors' angular momentum"]
     assert left_out(measured, FORMATS["urdf"]) == [friction, limits, *gears]
     assert left_out(measured, FORMATS["mjcf"]) == [limits, *gears]
-
-
-def models() -> Path:
-    """Returns the folder of the robots' files."""
-    return Path(__file__).parents[2] / "models"

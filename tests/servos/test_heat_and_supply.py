@@ -18,7 +18,7 @@ from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.contact.geometry import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.kinematics import joint_angles, joint_speeds
-from hexapod_cosim.models.servos.supply import duty_share, held_commands, supply_power, warmed
+from hexapod_cosim.models.servos.motor import duty_share, held_commands, supply_power, warmed
 
 WARM: dict[str, Any] = {
     "winding_capacity": 5.0,

@@ -18,7 +18,7 @@ from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.soil import law
-from hexapod_cosim.models.soil.losses import lost_power
+from hexapod_cosim.models.soil.law import lost_power
 from hexapod_cosim.models.soil.presets import soil_preset
 from hexapod_cosim.models.statics import standing
 

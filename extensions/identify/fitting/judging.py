@@ -3,7 +3,7 @@
 The covariance is that of the linearised problem with the spectra of the residuals (covariance.py),
 plus the square of the step that the search left. Residuals larger than the noise of the readings
 themselves say that the model does not explain the log: they widen all intervals, and far larger
-ones reject the model. Numbers of the robot file that the readings do not determine (rank.py) keep
+ones reject the model. Numbers of the robot file that the readings do not determine (misfit.py) keep
 its values, and the search ends with them there. How far this moves the others is a part of their
 intervals.
 """
@@ -17,18 +17,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.identify.fitting.covariance import coloured_information
-from hexapod_cosim.extensions.identify.fitting.differences import FINE
-from hexapod_cosim.extensions.identify.fitting.least_squares import BOUND, remaining_step
-from hexapod_cosim.extensions.identify.fitting.misfit import Misfit, misfits, read_noise
-from hexapod_cosim.extensions.identify.fitting.problem import Problem
-from hexapod_cosim.extensions.identify.fitting.rank import (
+from hexapod_cosim.extensions.identify.fitting.least_squares import BOUND, FINE, remaining_step
+from hexapod_cosim.extensions.identify.fitting.misfit import (
+    Misfit,
     dependences,
     determined,
+    misfits,
+    read_noise,
     sharpened,
     to_keep,
 )
+from hexapod_cosim.extensions.identify.fitting.problem import Problem
 from hexapod_cosim.extensions.identify.fitting.search import finished, searched
-from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
+from hexapod_cosim.extensions.identify.numbers import Unknown
 from hexapod_cosim.extensions.identify.unknowns import OF_FILE
 
 Array = NDArray[np.float64]

@@ -19,11 +19,11 @@ from hexapod_cosim.extensions.identify.experiment import (
     first_part,
     needs_simulation,
     readings,
+    simulate_in_worker,
     simulated,
 )
-from hexapod_cosim.extensions.identify.fitting import workers
 from hexapod_cosim.extensions.identify.fitting.covariance import Series
-from hexapod_cosim.extensions.identify.fitting.differences import (
+from hexapod_cosim.extensions.identify.fitting.least_squares import (
     FINE,
     ROUGH,
     Differences,
@@ -32,7 +32,7 @@ from hexapod_cosim.extensions.identify.fitting.differences import (
 )
 from hexapod_cosim.extensions.identify.log import CHANNELS, LogError
 from hexapod_cosim.extensions.identify.log_plant import LogPlant
-from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
+from hexapod_cosim.extensions.identify.numbers import Unknown
 from hexapod_cosim.extensions.identify.unknowns import is_delay
 from hexapod_cosim.models import FmuError, Robot
 
@@ -274,7 +274,7 @@ class Problem:
             found: Iterator[list[Array] | None] = map(self._try, moved)
         else:
             common = repeat(self._seconds), repeat(self.parameters)
-            found = self.pool.map(workers.simulate, map(self.values, moved), *common)
+            found = self.pool.map(simulate_in_worker, map(self.values, moved), *common)
         yield from (next(found) if own else base for own in needed)
 
     def _try(self, z: Array) -> list[Array] | None:

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.extensions.identify.fitting.differences import FINE
 from hexapod_cosim.extensions.identify.fitting.least_squares import (
     BOUND,
+    FINE,
     huber,
     minimised,
     remaining_step,

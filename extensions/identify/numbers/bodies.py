@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from hexapod_cosim.extensions.identify.numbers.unknown import Unknown
+from hexapod_cosim.extensions.identify.numbers import Unknown
 from hexapod_cosim.models import JOINT_NAMES, Robot
 
 PAST = 0.25  # of the length of a link

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
-from hexapod_cosim.extensions.identify.numbers.unknown import Unknown, section
-from hexapod_cosim.models import Robot
+from hexapod_cosim.extensions.identify.numbers import Unknown, section
+from hexapod_cosim.models import HexapodError, Robot, unknown_name
 from hexapod_cosim.models.records import Servo
 
 LINE: Callable[[Robot], bool] = lambda robot: robot.servo.drive == "line"  # noqa: E731
@@ -113,3 +114,61 @@ SERVO = (
         "servo.backlash", "rad", "servo", 0.003, positive=False, low=0.0, high=1.0, applies=ELASTIC
     ),
 )  # fmt: skip
+
+
+# terms besides Coulomb and viscous friction
+TERMS = {
+    "m1": (),
+    "m2": ("stribeck_friction",),
+    "m3": LOADS,
+    "m4": ("stribeck_friction", *LOADS, *STRIBECK_LOADS),
+    "m5": ("stribeck_friction", *LOADS, *STRIBECK_LOADS),
+    "m6": ("stribeck_friction", *LOADS, *STRIBECK_LOADS, *QUADRATIC),
+}
+SINGLE = ("m3", "m4")  # models with one coefficient for the torques of motor and load
+FIRST = 0.5  # of a typical term: where the search of one begins that the file does not have
+LEAST = 1e-3  # of a typical term: a smaller one of the file is as none
+APART = 1.1  # between the coefficients of motor and load where the search of M5, M6 begins
+
+
+def with_friction_model(robot: Robot, model: str) -> Robot:
+    """Returns the robot with the terms of a friction model; other terms are 0.
+
+    Terms are the robot file's, and a part of what is typical of servos of its size where it has
+    none.
+
+    Raises HexapodError for an unknown model, and for a servo without a model of its motor, which
+    has no such friction.
+    """
+    if model not in TERMS:
+        raise unknown_name("friction model", model, TERMS, where="--friction")
+    if not MOTOR(robot):
+        raise HexapodError(
+            "friction models are those of measured servos",
+            got=f'drive = "{robot.servo.drive}"',
+            expected='drive = "motor"',
+            fix="give a servo of `hexapod list servos` as [servo] model, or leave --friction out",
+            where="--friction",
+        )
+    servo, typical = robot.servo, _typical(robot.servo)
+    values: dict[str, Any] = dict.fromkeys(typical, 0.0)
+    for key in ("coulomb_friction", "viscous_friction", *TERMS[model]):
+        own = getattr(servo, key)
+        values[key] = own if own > LEAST * typical[key] else FIRST * typical[key]
+    for motor, external in (LOADS, STRIBECK_LOADS):
+        if model in SINGLE:
+            values[motor] = values[external] = 0.5 * (values[motor] + values[external])
+        elif values[motor] == values[external] > 0.0:
+            values[motor] *= APART
+    return replace(robot, servo=replace(servo, **values))
+
+
+def _typical(servo: Servo) -> dict[str, float]:
+    """Returns typical terms of the friction of servos of this size, by key."""
+    return {
+        "coulomb_friction": DRY * servo.torque_max,
+        "viscous_friction": VISCOUS * servo.torque_max / servo.speed_max,
+        "stribeck_friction": DRY * servo.torque_max,
+        **dict.fromkeys((*LOADS, *STRIBECK_LOADS), LOAD),
+        **dict.fromkeys(QUADRATIC, SQUARE),
+    }

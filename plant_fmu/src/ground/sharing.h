@@ -1,5 +1,5 @@
 /* sharing.h - shares of the faces, edges and corners of blocks that carry the same spot of a foot;
- * models/contact/sharing.py is the readable form. For numbers with and without a derivative: the
+ * models/contact/geometry.py is the readable form. For numbers with and without a derivative: the
  * kernels include it behind lanes.h. */
 #ifndef HX_SHARING_H
 #define HX_SHARING_H
