@@ -126,8 +126,8 @@ def test_only_falls_have_an_exit_code_of_their_own(
 CPG = Path(__file__).resolve().parents[2] / "examples" / "controllers" / "cpg.py"
 
 
-def test_an_address_that_is_no_scheduler_is_refused(call: Call) -> None:
-    outcome = call("study", "friction_speed", "--scheduler", "localhost")
+def test_an_address_that_is_no_scheduler_is_refused(call: Call, tmp_path: Path) -> None:
+    outcome = call("study", "friction_speed", "--scheduler", "localhost", "-o", tmp_path / "out")
     assert_refused(outcome, "no scheduler answers", "got 'localhost'", "tcp://HOST:8786")
 
 

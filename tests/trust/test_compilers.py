@@ -26,7 +26,7 @@ from hexapod_cosim.models import load_robot
 
 PLANT = Path(__file__).parents[2] / "plant_fmu"
 CONTROLLER = PLANT.parent / "controller/fmu"
-SHARED = ("status", "checksum", "range_check", "message")  # sources of the plant in the controller
+SHARED = ("shared", "message")  # sources of the plant in the controller
 COMPILERS = {"gcc": ["gcc"], "clang": ["clang"], "zig": [sys.executable, "-m", "ziglang", "cc"]}
 FEW = [("clang", "-O1")]  # clang shares no optimiser with gcc
 ALL = [(name, f"-O{level}") for name in COMPILERS for level in range(4)]

@@ -139,12 +139,13 @@ HX_RARE void torso_moment(const hxModel *model, const hxContactState *state,
   }
 }
 
-/* Computes the shares of feet on blocks. */
+/* Computes the shares of feet on blocks. Slots past the last leg mirror leg 0 here too, since only
+ * some kernels have them. */
 HX_RARE void hx_moment_shares(const hxModel *model, const hxContactState *state, hxMoment *moment) {
   hxNumber share[HX_FOOT_ROWS];
   for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row)
     for (int slot = 0; slot < HX_SLOTS; ++slot) moment->share[row][slot] = 1.0;
-  for (int slot = 0; slot < HX_SLOTS; ++slot) {
+  for (int slot = 0; slot < HX_LEGS; ++slot) {
     hxFootFace face[HX_FOOT_ROWS];
     if (!hx_has_several(state, slot)) continue;
     for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) {
@@ -152,9 +153,12 @@ HX_RARE void hx_moment_shares(const hxModel *model, const hxContactState *state,
       face[row] = (hxFootFace){at->delta[slot],
                                {at->normal[0][slot], at->normal[1][slot], at->normal[2][slot]}};
     }
-    hx_foot_shares(model, state, slot < HX_LEGS ? slot : 0, face, share);
+    hx_foot_shares(model, state, slot, face, share);
     for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) moment->share[row][slot] = share[row];
   }
+  for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row)
+    for (int slot = HX_LEGS; slot < HX_SLOTS; ++slot)
+      moment->share[row][slot] = moment->share[row][0];
 }
 
 /* Stores the contacts between legs at one end of a step. */
