@@ -120,10 +120,10 @@ def test_the_front_page_of_the_site_walks(site: Path) -> None:
         page.set_default_timeout(PATIENCE)
         page.goto((site / "index.html").as_uri())
         frame = page.wait_for_selector("iframe.walk").content_frame()
-        frame.wait_for_function("window.hexapod && window.hexapod.poses.newest")
+        frame.wait_for_function("window.hexapod && window.hexapod.shown.frame")
         frame.locator("canvas").first.click()
         page.keyboard.down("w")
-        frame.wait_for_function("window.hexapod.poses.newest.position[0] > 0.03")
+        frame.wait_for_function("window.hexapod.shown.frame.position[0] > 0.03")
 
 
 @of_the_site
