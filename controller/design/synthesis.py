@@ -100,7 +100,8 @@ def nominal(robot: Robot, plant: StandingPlant) -> bool:
     return bool(NOMINAL[0] <= plant.load(robot).mean() <= NOMINAL[1])
 
 
-def _check(robot: Robot, needs: Requirements, plants: Plants, *, period: float) -> None:
+def check_period(period: float) -> None:
+    """Raises GainsError for a period of the controller [s] that is not a positive number."""
     if not 0.0 < period < math.inf:
         raise GainsError(
             "impossible controller period",
@@ -108,6 +109,10 @@ def _check(robot: Robot, needs: Requirements, plants: Plants, *, period: float) 
             expected="a number > 0",
             fix="give it in seconds",
         )
+
+
+def check_position_servos(robot: Robot) -> None:
+    """Raises GainsError for a robot whose servos hold no position."""
     if robot.servo.mode != "position" or robot.servo.kp <= 0.0:
         raise GainsError(
             "compliant control shifts the servos' targets",
@@ -115,6 +120,11 @@ def _check(robot: Robot, needs: Requirements, plants: Plants, *, period: float) 
             expected="servo mode position with kp > 0",
             fix="use position servos, or kinematic control",
         )
+
+
+def _check(robot: Robot, needs: Requirements, plants: Plants, *, period: float) -> None:
+    check_period(period)
+    check_position_servos(robot)
     with raising_gains_errors():
         check_record(needs, "requirements")
     for name, plant in plants.items():

@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from hexapod_cosim.controller import Gains, GainsError, Requirements
 from hexapod_cosim.controller.design import StandingPlant, design_gains
+from hexapod_cosim.controller.design.synthesis import check_period, check_position_servos
 from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.design.linearise import Motion, linearise
@@ -81,14 +82,8 @@ def examine_stances(
 
 
 def _check_can_design(robot: Robot, period: float) -> None:
-    """Raises GainsError for a period that is not positive and for feet without friction."""
-    if not period > 0.0:
-        raise GainsError(
-            "impossible controller period",
-            got=period,
-            expected="a number > 0",
-            fix="give it in seconds",
-        )
+    """Raises GainsError for an impossible period and for feet without friction."""
+    check_period(period)
     if robot.friction.law == "none" or robot.friction.mu == 0.0:
         raise GainsError(
             "compliant control answers to the feet's friction",
@@ -124,13 +119,7 @@ def level_fmu(robot: Robot) -> Iterator[Fmu]:
 
     Raises GainsError for a robot without position servos.
     """
-    if robot.servo.mode != "position" or robot.servo.kp <= 0.0:
-        raise GainsError(
-            "compliant control shifts the servos' targets",
-            got=f"servo mode {robot.servo.mode}, kp {robot.servo.kp}",
-            expected="servo mode position with kp > 0",
-            fix="use position servos, or kinematic control",
-        )
+    check_position_servos(robot)
     # level ground is normal to gravity
     down = (0.0, 0.0, -float(np.linalg.norm(robot.gravity)))
     level = replace(robot, gravity=down, terrain=replace(robot.terrain, kind="flat", height=0.0))

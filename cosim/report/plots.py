@@ -77,7 +77,8 @@ def slip(views: Views) -> Figure:
     figure = Figure(figsize=(WIDTH, 5.0))
     grid = figure.add_gridspec(3, 3)
     top = figure.add_subplot(grid[0, :])
-    axes = np.ravel(grid[1:, :].subgridspec(2, 3).subplots(sharex=True, sharey=True))  # type: ignore[arg-type]
+    legs = grid[1:, :].subgridspec(2, 3)
+    axes = np.ravel(legs.subplots(sharex=True, sharey=True))  # type: ignore[arg-type]
     for label, view in views.items():
         time, speed = view.recording.time, slip_under_load(view.recording, view.parameters)
         total = 1e3 * running_integral(time, speed.sum(axis=1))

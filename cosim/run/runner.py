@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
-from time import thread_time
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
@@ -80,7 +79,6 @@ class Runner(Closing):
         self._masters: dict[tuple[Path, tuple[str, ...] | None], NativeMaster] = {}
         self._plants: dict[Path, Fmu] = {}
         self._controller: Fmu | None = None
-        self.loop_time = 0.0  # s    processor time of the last run's loop
         # the controller's latest set-up and the blocks of parameters that make it
         self._setup: tuple[ControllerSetup, list[FmuBlock]] | None = None
         self._settings: dict[tuple[Path, Robot], dict[str, float]] = {}
@@ -164,13 +162,11 @@ class Runner(Closing):
             )
         if begin is not None:
             begin()
-        started = thread_time()
         every = scenario.every if self._everything else 1  # metrics need every macro-step
         errors = errors_of(scenario, plan.schedule)
         outcome = master.run(
             plan.schedule, h=scenario.macro_step, every=every, errors=errors, progress=progress
         )
-        self.loop_time = thread_time() - started
         # only a run that records everything gets a report, which shows the surface
         surface = run_surface(plant, plan.robot, parameters) if self._everything else None
         return make_result(

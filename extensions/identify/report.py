@@ -9,12 +9,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jinja2 import ChoiceLoader, PackageLoader
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller.figure_style import PALETTE, SETTINGS, UNDATED, WIDTH
-from hexapod_cosim.cosim.common.control_style import all_styles
-from hexapod_cosim.cosim.report.page import environment
+from hexapod_cosim.cosim.report.page import render
 from hexapod_cosim.extensions.identify.log import CHANNELS, Channel, Log, channel_of
 from hexapod_cosim.models import LEG_NAMES
 
@@ -112,11 +110,7 @@ class Section:
 
 def rendered(sections: Sequence[Section], **content: Any) -> str:
     """Returns a page. content: title, headline, lead, warnings, command, facts, source."""
-    own = environment()
-    loaders = [PackageLoader("hexapod_cosim.extensions", "identify"), own.loader]
-    pages = own.overlay(loader=ChoiceLoader([each for each in loaders if each is not None]))
-    template = pages.get_template(TEMPLATE)
-    return template.render(styles=all_styles(()), sections=sections, **content)
+    return render(TEMPLATE, extension="identify", sections=sections, **content)
 
 
 def number(value: float) -> str:

@@ -156,7 +156,9 @@ def realtime(
 ) -> None:
     """Measure doStep of the plant in a walk: quantiles and histogram, touch-downs apart."""
     from hexapod_cosim.cosim.run.plan import chosen_gains  # noqa: PLC0415
-    from hexapod_cosim.extensions.live import realtime as live  # noqa: PLC0415  draws with Matplotlib
+
+    # imported here because it draws with Matplotlib
+    from hexapod_cosim.extensions.live import realtime as live  # noqa: PLC0415
     from hexapod_cosim.extensions.live.settings import live_scenario  # noqa: PLC0415
 
     text = parse_control(control, where="--control").text

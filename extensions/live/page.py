@@ -7,8 +7,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from hexapod_cosim.cosim.common.control_style import all_styles
-from hexapod_cosim.cosim.report.page import VIEWER, environment, viewer_script
+from hexapod_cosim.cosim.report.page import VIEWER, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json
 from hexapod_cosim.extensions.live.settings import FLAT, OWN, Choices
 from hexapod_cosim.models import HexapodError
@@ -35,17 +34,15 @@ def render_page(
             "the page needs the viewer, which is not installed", got=f"no {VIEWER}",
             fix="install the package without HX_VIEWER=OFF",
         )  # fmt: skip
-    return (
-        environment("live")
-        .get_template(TEMPLATE)
-        .render(
-            title=choices.scenario.title,
-            robot=choices.scenario.robot,
-            setup=Markup(as_json(_describe(choices) | dict(more or {}))),
-            styles=all_styles(list(choices.controls)),
-            viewer=script,
-            module=module,
-        )
+    return render(
+        TEMPLATE,
+        controls=list(choices.controls),
+        extension="live",
+        title=choices.scenario.title,
+        robot=choices.scenario.robot,
+        setup=Markup(as_json(_describe(choices) | dict(more or {}))),
+        viewer=script,
+        module=module,
     )
 
 

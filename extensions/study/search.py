@@ -230,7 +230,11 @@ def make_sampler(study: Study) -> Any:
 
 def distributions(variables: Sequence[Factor]) -> dict[str, Any]:
     """Returns Optuna's distributions of the variables, by name."""
-    from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution  # noqa: PLC0415
+    from optuna.distributions import (  # noqa: PLC0415
+        CategoricalDistribution,
+        FloatDistribution,
+        IntDistribution,
+    )
 
     def distribution(factor: Factor) -> Any:
         if factor.kind == VALUES:

@@ -15,12 +15,12 @@ from pathlib import Path
 from hexapod_cosim.cosim.cli import main
 
 EXTENSIONS = Path(__file__).resolve().parents[2] / "extensions"
-COMMANDS = {
-    "study": ("study",),
-    "identify": ("identify", "replay"),
-    "course": ("benchmark",),
-    "live": ("live", "realtime"),
-    "gym": ("gym",),
+COMMANDS = {  # of each extension
+    "study": {"study"},
+    "identify": {"identify", "replay"},
+    "course": {"benchmark"},
+    "live": {"live", "realtime"},
+    "gym": {"gym"},
 }
 # the beginnings of commands of extensions that were deleted
 MISSING = [

@@ -17,15 +17,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pages import COMMANDS
 
 ROOT = Path(__file__).parents[2]
-COMMANDS: dict[str, set[str]] = {  # of each extension
-    "study": {"study"},
-    "identify": {"identify", "replay"},
-    "course": {"benchmark"},
-    "live": {"live", "realtime"},
-    "gym": {"gym"},
-}
 CORE_COMMANDS = {
     *("export", "simulate", "compare", "design", "report", "controller", "examples", "validate"),
     *("terrain", "list"),
