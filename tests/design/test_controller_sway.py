@@ -120,9 +120,9 @@ def test_a_standing_foot_keeps_its_place_on_the_ground(sway: bool) -> None:
     for step in range(900):
         controller.step(step * PERIOD, BodyCommand(vx=0.06, yaw_rate=0.1), measurement)
         now = controller.plan.now
-        ways.append(abs(now.sway))
+        ways.append(abs(now.torso))
         turn = np.exp(1j * now.feet.turn)
-        ground = now.feet.way + turn * (now.sway + now.plane)
+        ground = now.feet.way + turn * (now.torso + now.plane)
         stands = controller.plan.paths.clock.standing & (controller.plan.at > 0)
         if last is not None:
             assert np.abs(np.where(stands, ground - last, 0.0)).max() < ROUND_OFF
