@@ -111,17 +111,13 @@ def terrain(
         str,
         typer.Argument(
             metavar="NAME",
-            help="A ground of `hexapod list terrains`.",
-            autocompletion=completion.terrain,
+            help="A surface of `hexapod list terrains`.",
+            autocompletion=completion.surface,
         ),
     ],
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="FILE", help="Draw the surface as PNG or SVG."),
-    ] = None,
-    heights: Annotated[
-        Path | None,
-        typer.Option("--heights", metavar="FILE", help="Write its heights as a 16-bit PNG."),
     ] = None,
     values: Annotated[
         list[str] | None,
@@ -134,11 +130,10 @@ def terrain(
     robot: RobotName = "athena",
     json: Json = False,
 ) -> None:
-    """Show a kind of ground: its size and parameters, its picture beside a robot, its heights."""
-    from hexapod_cosim.cosim.cli.terrains import ground_from, show_terrain
+    """Show a surface: its size and parameters, and its picture beside a robot."""
+    from hexapod_cosim.cosim.cli.terrains import show_terrain, surface_from
 
-    ground = ground_from(name, values or [])
-    show_terrain(ground, robot=robot, picture=output, heights=heights, as_json=json)
+    show_terrain(surface_from(name, values or []), robot=robot, picture=output, as_json=json)
 
 
 def examples(
