@@ -10,7 +10,7 @@ import base64
 import math
 import tomllib
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,6 @@ from hexapod_cosim.cosim.export.picture import COLOURS, THICKNESS
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.report.packing import STEPS
 from hexapod_cosim.cosim.results.folder import StoredResult
-from hexapod_cosim.cosim.results.footprints import Footprint
 from hexapod_cosim.cosim.results.support import FLAT, SLOPE
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot
 from hexapod_cosim.models.ground.faces import surface_heights
@@ -152,24 +151,6 @@ def _sampled(surface: Surface) -> tuple[Array, Array, Array, NDArray[np.uint8] |
     nodes = np.ix_(rows, columns)
     height = surface.height[nodes] if parts == 1 and not margin else surface_heights(surface, x, y)
     return x, y, height, None if surface.material is None else surface.material[nodes]
-
-
-def pack_footprints(footprints: Iterable[Footprint]) -> list[list[float]]:
-    """Returns begin, end [s], x, y, depth and radius [m] of footprints for the viewer.
-
-    The end of those that stay is 0.
-    """
-    return [
-        [
-            round(one.begin, 6),
-            round(one.end, 6) if math.isfinite(one.end) else 0.0,
-            round(one.x, 5),
-            round(one.y, 5),
-            round(one.depth, 6),
-            one.radius,
-        ]
-        for one in footprints
-    ]
 
 
 def stride(surface: Surface) -> int:

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from contextlib import suppress
 from typing import Any
 
 from hexapod_cosim.cosim.common.control_style import control_styles
-from hexapod_cosim.cosim.master.recorder import ColumnError
 from hexapod_cosim.cosim.report.columns import MOST_ROWS, Chosen, choose
 from hexapod_cosim.cosim.report.geometry import (
     describe_ground,
     describe_robot,
-    pack_footprints,
     pack_surface,
     stride,
 )
 from hexapod_cosim.cosim.report.packing import pack
 from hexapod_cosim.cosim.results.folder import StoredResult
-from hexapod_cosim.cosim.results.footprints import find_footprints
 from hexapod_cosim.cosim.results.window import CONTACT_SHARE
 from hexapod_cosim.models.ground.surface import Surface
 
@@ -68,8 +64,6 @@ def _describe(
     ground: dict[str, Any] = describe_ground(view.parameters)
     if run.view.surface is not None:
         ground["surface"] = surfaces.index(run.view.surface)
-    with suppress(ColumnError):
-        ground["footprints"] = pack_footprints(find_footprints(view.recording, view.parameters))
     return (
         about | {"robot": describe_robot(run), "ground": ground} | pack(chosen.time, chosen.columns)
     )

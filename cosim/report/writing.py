@@ -286,5 +286,4 @@ def _walked(facts: RunFacts) -> str:
 
 
 def _robot(facts: RunFacts) -> str:
-    drop = f" {facts.drop.text}" if facts.drop else ""
-    return f"Robot {facts.robot.name}, {_duration(facts)}.{drop}"
+    return f"Robot {facts.robot.name}, {_duration(facts)}."

@@ -26,16 +26,12 @@ export interface Robot {
   readonly thickness: readonly number[];
 }
 
-/** A footprint in soil: begin, end (0: it stays) [s], x and y, depth below the surface, radius [m]. */
-export type PackedFootprint = readonly [number, number, number, number, number, number];
-
 /** A plane; with `surface`, the number of the surface whose heights are above the plane's. */
 export interface Ground {
   readonly height: number;
   readonly rise: number;
   readonly heading: number;
   readonly surface?: number;
-  readonly footprints?: readonly PackedFootprint[];
 }
 
 export interface Material {
