@@ -28,12 +28,8 @@ from hexapod_cosim.cosim.interface.controller import (
     load_controller_interface,
 )
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
-from hexapod_cosim.cosim.interface.plant import (
-    CAUSALITIES,
-    Interface,
-    Variable,
-    load_interface,
-)
+from hexapod_cosim.cosim.interface.plant import load_interface
+from hexapod_cosim.cosim.interface.records import CAUSALITIES, Interface, Variable
 from hexapod_cosim.models.robot import load_robot
 
 ROOT = Path(__file__).resolve().parents[1]

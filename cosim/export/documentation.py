@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from hexapod_cosim.cosim.interface.arrays import arrays
-from hexapod_cosim.cosim.interface.plant import CAUSALITIES, Interface, Pattern, Variable
+from hexapod_cosim.cosim.interface.records import CAUSALITIES, Interface, Pattern, Variable
 
 INTERFACES = {"CoSimulation": "co-simulation", "ModelExchange": "model exchange"}
 # explanations of the names in the tables, for scalars (False) and arrays (True)

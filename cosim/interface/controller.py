@@ -13,8 +13,8 @@ from hexapod_cosim.controller.controller import gains_warnings
 from hexapod_cosim.controller.gains import HoldGains, SupportGains
 from hexapod_cosim.controller.size import limit_gains, paper_gains, requirements_for, taken
 from hexapod_cosim.cosim.common.components import CONTROLLER
-from hexapod_cosim.cosim.interface.plant import Interface, expand_interface
-from hexapod_cosim.cosim.interface.start_values import parameter_values
+from hexapod_cosim.cosim.interface.plant import expand_interface, parameter_values
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.models import Robot
 
 ALL_PARTS = Parts()

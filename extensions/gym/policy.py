@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.components import Component
 from hexapod_cosim.cosim.common.files import atomic_path
-from hexapod_cosim.cosim.interface.plant import Interface, expand_interface
+from hexapod_cosim.cosim.interface.plant import expand_interface
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.extensions.gym.settings import BLOCKS, JOINTS, MEASURABLE, RATE, EnvSettings
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, Robot
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
-from hexapod_cosim.cosim.interface.start_values import parameter_values
+from hexapod_cosim.cosim.interface.plant import parameter_values
 from hexapod_cosim.extensions.identify.log import ATTITUDE, Log, LogError, channel_of
 from hexapod_cosim.extensions.identify.log_plant import LogPlant
 from hexapod_cosim.extensions.identify.numbers import Unknown

@@ -9,7 +9,8 @@ from typing import Any, get_type_hints
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.controller.gains import PARTS
-from hexapod_cosim.cosim.interface.plant import Interface, load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.cosim.scenario.controls import LAW
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
