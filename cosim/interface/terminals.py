@@ -65,9 +65,9 @@ def render_terminals(names: Sequence[str]) -> str:
         _add(terminal, "foot", FOOT, points)
     torso = _add(terminals, "torso", "what happens to the torso")
     for name, text, starts in TORSO:
-        members = [(one, one.partition(".")[2]) for one in names if one.partition("[")[0] in starts]
-        if members:
-            _add(torso, name, text, members)
+        found = [(one, one.partition(".")[2]) for one in names if one.partition("[")[0] in starts]
+        if found:
+            _add(torso, name, text, found)
     return document_text(root)
 
 

@@ -19,7 +19,7 @@ from hexapod_cosim.extensions.course.statistics import DRAWS
 from hexapod_cosim.extensions.course.table import Table, judge_parts
 from hexapod_cosim.extensions.course.texts import markdown
 
-RESULT, RUNS, TABLES = "benchmark.json", "runs.csv", "tables.md"
+RESULT, RUNS, TABLES = FILES = ("benchmark.json", "runs.csv", "tables.md")
 FORMAT = 1
 METHODS = {  # how the intervals are made
     "success": "Wilson, 95 %",

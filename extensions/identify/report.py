@@ -110,7 +110,7 @@ class Section:
 
 def rendered(sections: Sequence[Section], **content: Any) -> str:
     """Returns a page. content: title, headline, lead, warnings, command, facts, source."""
-    return render(TEMPLATE, extension="identify", sections=sections, **content)
+    return render(TEMPLATE, package=__package__, sections=sections, **content)
 
 
 def number(value: float) -> str:

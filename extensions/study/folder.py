@@ -17,9 +17,9 @@ import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
 from hexapod_cosim.cosim.common.files import (
+    RESUMABLE,
     RUN_FILE,
     RUNNING,
-    STUDY,
     atomic_path,
     not_writable,
     read_json,
@@ -29,6 +29,8 @@ from hexapod_cosim.cosim.common.files import (
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.extensions.study.records import StudyError
 from hexapod_cosim.extensions.study.store import BOOLEAN, INTEGER, REAL, TEXT, WALL, Store
+
+STUDY = "study"  # kind of the folder, in run.json
 
 MANIFEST, LOCK, RESULTS = "manifest.json", ".lock", "results.parquet"
 COMPRESSION = "zstd"
@@ -65,7 +67,8 @@ def begin_folder(folder: Path, manifest: Mapping[str, Any], *, command: str) -> 
             fix="choose another with -o",
             where=str(folder),
         )
-    facts = {"kind": STUDY, "status": RUNNING, "title": manifest["title"], "command": command}
+    facts = {"kind": STUDY, "status": RUNNING, "title": manifest["title"]}
+    facts |= {"command": command, RESUMABLE: True}
     write_json(folder / RUN_FILE, facts)
     write_json(folder / MANIFEST, manifest)
 

@@ -39,7 +39,7 @@ def write_study_report(results: Results, folder: Path) -> list[Path]:
     ]
     page = render(
         "study.html.jinja",
-        extension="study",
+        package=__package__,
         controls=results.study.controls,
         results=results,
         cards=cards(results),
