@@ -73,8 +73,21 @@ def solve(system: Array, needed: tuple[float, float, float]) -> Array:
 class Support:
     """Computes activations and load shares for one gait of one robot."""
 
-    def __init__(self, robot: Robot, gait: Gait, gains: SupportGains, *, rest: Demand) -> None:
-        """Computes the constants of gait and ground; rest: the demand of the standing robot."""
+    def __init__(
+        self,
+        robot: Robot,
+        gait: Gait,
+        gains: SupportGains,
+        *,
+        rest: Demand,
+        active: bool = True,
+    ) -> None:
+        """Computes the constants of gait and ground.
+
+        rest: the demand of the standing robot; active: the part is on; otherwise no foot is lowered
+        and no servo carries the load.
+        """
+        self.active = active
         self.duty, self.stiffness, self.rest = gait.duty, robot.contact.stiffness, rest
         # limited, so that the two changes of a leg's load do not overlap in any gait
         self.handover = min(gains.handover_time / gait.period, gait.duty, 1.0 - gait.duty)  # cycles
@@ -115,6 +128,8 @@ class Support:
 
         Arguments are those of share_normal().
         """
+        if not self.active:
+            return np.zeros(LEGS)
         normal = self.share_normal(feet, activation, self.rest.weight, self.rest.moment)
         return np.asarray(indentation(normal, self.stiffness) - self.rest_depth)
 

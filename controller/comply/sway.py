@@ -17,9 +17,9 @@ import numpy as np
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.plane import LEGS, along
 from hexapod_cosim.controller.sense.load_adaptation import LoadAdaptation
+from hexapod_cosim.controller.walk.foot_paths import PlannedFeet
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Masses
 from hexapod_cosim.controller.walk.kinematics import LegSolver
-from hexapod_cosim.controller.walk.trajectory import PlannedFeet
 
 REACH = 1e-3  # m    by which all feet are moved to find the mass that moves with them
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import fields
 
 from hexapod_cosim.controller import Parts
 from hexapod_cosim.cosim.interface.plant import load_interface
@@ -137,6 +136,7 @@ def _unknown(kind: str, name: str, valid: list[str], expected: str, *, where: st
 def setting_names() -> list[str]:
     """Returns the scenario's dotted keys."""
     records = {"command": Command, "sensors": Sensors, "variation": Variation, **SETTINGS}
+    records |= {"outputs": Outputs, "compliance": Parts}
     keys = [("terrain", key) for key in (*terrain_specs(), "patch")]
     keys += [
         (section, key)
@@ -144,7 +144,5 @@ def setting_names() -> list[str]:
         for key in specs(record)
         if section != "terrain" and key not in UNUSED.get(section, ())
     ]
-    plain = {"outputs": Outputs, "compliance": Parts}
-    keys += [(section, item.name) for section, record in plain.items() for item in fields(record)]
     keys += [("walk", key) for key in WALK_KEYS]
     return [f"{section}.{key}" for section, key in keys]

@@ -20,9 +20,14 @@ from hexapod_cosim.cosim.scenario.records import (
     SensorFault,
     ServoFault,
 )
-from hexapod_cosim.cosim.scenario.values import read_list, read_record
 from hexapod_cosim.models import ScenarioError
-from hexapod_cosim.models.schema import Choice, expect_table, refuse_unknown_keys, specs
+from hexapod_cosim.models.schema import (
+    Choice,
+    expect_table,
+    read_record,
+    refuse_unknown_keys,
+    specs,
+)
 
 SENSOR_TEXTS = {
     "dead": "reads zero",
@@ -46,8 +51,12 @@ SERVO_TEXTS = {
 
 def read_events(value: Any) -> tuple[Event, ...]:
     """Reads the entries [[events]]. Raises ScenarioError."""
-    entries = read_list(value, "events")
-    return tuple(_read_event(entry, f"events[{k}]") for k, entry in enumerate(entries))
+    if not isinstance(value, list | tuple):
+        fix = "write [[events]] with two brackets"
+        raise ScenarioError(
+            "wrong type", got=value, expected="entries [[events]]", fix=fix, where="events"
+        )
+    return tuple(_read_event(entry, f"events[{k}]") for k, entry in enumerate(value))
 
 
 def _read_event(table: Any, where: str) -> Event:

@@ -22,7 +22,7 @@ from hexapod_cosim.models import (
     Solver,
     Terrain,
 )
-from hexapod_cosim.models.schema import Choice, Number, Vector, specs
+from hexapod_cosim.models.schema import Choice, Flag, Number, Text, Texts, Vector, Whole, specs
 
 CONTROLS = ("kinematic", "paper", "compliant")
 COMPARED = ("kinematic", "compliant")  # unless a command or a study names its controls
@@ -48,8 +48,6 @@ SETTINGS: dict[str, type[Any]] = {
 }
 UNUSED = {"gait": ("stride",)}  # keys of robot files that scenarios replace by the body command
 GRAVITY = Number("m/s2", above=0.0)  # along -z; or three numbers, a vector in world axes
-# weight of the torques in the planned squeeze of the legs
-SQUEEZE = Number("1", at_least=0.0, at_most=0.99)
 GRAVITY_VECTOR = Vector("m/s2", 3)
 GRAVITY_NAMES = ("gravity[1]", "gravity[2]", "gravity[3]")  # the FMU's parameters
 ZERO = (0.0, 0.0, 0.0)
@@ -212,9 +210,9 @@ class Outputs:
     """Which files and columns a run writes."""
 
     # patterns of variable names, for the columns of results.csv; Parquet has all columns
-    csv: tuple[str, ...] = ("*",)
-    formats: tuple[str, ...] = field(default_factory=default_formats)
-    plots: bool = True
+    csv: Annotated[tuple[str, ...], Texts()] = ("*",)
+    formats: Annotated[tuple[str, ...], Texts(FORMATS)] = field(default_factory=default_formats)
+    plots: Annotated[bool, Flag()] = True
     # time between two rows of the recording; 0: every macro-step. Metrics use all macro-steps
     interval: Annotated[float, Number("s", at_least=0.0)] = 0.0
 
@@ -223,8 +221,8 @@ class Outputs:
 class Scenario:
     """One run. It is complete but for the robot file that it names."""
 
-    title: str = "walk"
-    robot: str = "athena"  # a name of `hexapod list robots`, or a path
+    title: Annotated[str, Text()] = "walk"
+    robot: Annotated[str, Text()] = "athena"  # a name of `hexapod list robots`, or a path
     # text of a control: a name of CONTROLS, law.py:Class or controller.fmu, see controls.py
     control: str = "kinematic"
     # the other keys of a table [control]: parameters of the user's law or FMU
@@ -232,7 +230,7 @@ class Scenario:
     start: Annotated[float, Number("s")] = 0.0
     duration: Annotated[float, Number("s", above=0.0)] = 10.0
     macro_step: Annotated[float, Number("s", above=0.0, at_most=0.1)] = DEFAULT_PERIOD
-    seed: int = 0
+    seed: Annotated[int, Whole()] = 0
     gravity: tuple[float, float, float] | None = None  # m/s2    None: the robot's own
     walk: Walk = Walk()
     settings: Mapping[str, Mapping[str, Any]]  # differences from the robot file, by section
@@ -293,8 +291,8 @@ class Scenario:
 
     def to_table(self) -> dict[str, Any]:
         """Returns the scenario as the tables of an equivalent scenario file."""
-        keys = ("title", "robot", "control", *PLAIN_KEYS, "seed")
-        plain = {key: getattr(self, key) for key in keys}
+        names = [item.name for item in fields(self)]
+        plain = {key: getattr(self, key) for key in names if key in ("control", *PLAIN_KEYS)}
         plain |= {} if self.gravity is None else {"gravity": list(self.gravity)}
         tables = {key: dict(value) for key, value in self.settings.items() if value}
         if self.walk.stance is not None:
@@ -317,12 +315,12 @@ class Scenario:
         )
 
 
-PLAIN_KEYS = tuple(specs(Scenario))  # start, duration, macro_step
+PLAIN_KEYS = tuple(specs(Scenario))  # title, robot, start, duration, macro_step, seed
 SECTIONS = (
     *("command", "control", "walk", "sensors", "compliance", "variation", "outputs", "parameters"),
     *SETTINGS,
 )
-KEYS = ("title", "robot", *PLAIN_KEYS, "seed", "gravity", "events", *SECTIONS)
+KEYS = (*PLAIN_KEYS, "gravity", "events", *SECTIONS)
 
 
 UNUSED_SETTINGS = (("delay", 0.0), ("noise", 0.1), ("share", 0.5))

@@ -1,69 +1,44 @@
-/* state.h - data of a controller: constants compiled from the definition, and the state, without
- * pointers; and its tick, from body command and measurement to joint commands. Python:
- * controller/controller.py. */
+/* state.h - data of a controller: constants compiled from the definition, and
+ * the state, without pointers; and its tick, from body command and measurement
+ * to joint commands. Python: controller/controller.py. */
 #ifndef HX_CONTROLLER_STATE_H
 #define HX_CONTROLLER_STATE_H
 
-#include "comply/compliant.h"
 #include "comply/paper.h"
 #include "hexapod/inside.h"
+#include "plan.h"
 #include "walk/fade.h"
 
 HX_HIDDEN_BEGIN
 
 typedef struct hxControllerModel {
-  double period;        /* s */
-  int compliant, paper; /* this control, otherwise kinematic control */
+  int paper; /* the paper's control; otherwise compliant or kinematic control */
   hxGait gait;
-  hxLegSolver leg[HX_LEGS];
-  hxCommandRampModel ramp;
-  hxFootPathsModel paths;
-  hxCompliantModel laws;
+  hxWalkPlanModel plan;
   hxPaperModel corrections; /* of the paper's control */
   hxFadeModel fade;
 } hxControllerModel;
-
-/* One planned step. It depends on the command alone. Feet are in the walking frame. */
-typedef struct hxPlannedStep {
-  double value[HX_COMMANDS],
-      rate[HX_COMMANDS]; /* vx vy yaw_rate height roll pitch, and per second */
-  hxPosture posture;
-  hxPlannedFeet feet;
-  hxPlane sway;               /* m, of the torso against the swinging legs (C54) */
-  hxPlane plane[HX_LEGS];     /* m, of the feet from the torso that sways */
-  double activation[HX_LEGS]; /* 1 */
-  double lowering[HX_LEGS];   /* m, deformation of the ground */
-  double height[HX_LEGS];     /* m, of the lowered feet */
-  hxPlane shift[HX_LEGS];     /* m, of contact points, by rolling */
-  hxPose pose[HX_LEGS];
-  hxMasses masses;
-} hxPlannedStep;
 
 typedef struct hxControllerState {
   double start; /* s, time of the first tick */
   double time;  /* s */
   int64_t tick; /* number of the next tick */
-  hxCommandRamp ramp;
-  hxFootPaths paths;
-  int64_t at;   /* the present step, counted from the beginning of its section */
-  int64_t last; /* the step at which the command comes to rest and is planned again */
-  int cut;      /* the present step is the last of its section: a leg lifts off or touches down */
-  int has_before, has_after; /* the neighbours of the present step are planned */
-  int present;               /* index of the present step in `step`, a ring buffer */
-  hxPlannedStep step[3];
+  hxWalkPlan plan;
   hxCompliant compliant;
   hxPaper paper;
-  hxFade fade;  /* from the control before */
-  int model;    /* index of the present model; the other one is that of the next gait */
-  int changing; /* to the other model */
+  hxFade fade;               /* from the control before */
+  int model;                 /* index of the present model; the other one is that of the next
+                                gait */
+  int changing;              /* to the other model */
   hxControllerOutput output; /* of the last tick */
 } hxControllerState;
 
 struct hxController {
   hxControllerDefinition definition; /* with the gait that was asked for last */
   hxControllerModel model[2];        /* of the present gait and of the next one */
-  /* the present state, and the other one: the next tick's, computed early for its outputs, or that
-   * before a step, which one that fails restores. It is not part of the controller's state */
+  /* the present state, and the other one: the next tick's, computed early for
+   * its outputs, or that before a step, which one that fails restores. It is
+   * not part of the controller's state */
   hxControllerState state[2];
   int now;      /* index of the present state */
   int is_ahead; /* the other state is that after the next tick under `input` */
@@ -76,22 +51,24 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
 /* Resets to standing in the stance, with all states of the laws cleared. */
 void hx_controller_begin(const hxControllerModel *model, double t, hxControllerState *state);
 
-/* Continues in the gait of the other model once all legs stand and carry their whole loads, when
- * the gait is being changed (C55). The models differ in their gaits only. */
+/* Continues in the gait of the other model once all legs stand and carry their
+ * whole loads, when the gait is being changed (C55). The models differ in their
+ * gaits only. */
 void hx_controller_adopt(hxControllerModel model[2], hxControllerState *state);
 
 /* Begins a change to the gait of the other model (C55). */
 void hx_controller_change(hxControllerModel model[2], hxControllerState *state);
 
-/* Goes on under another control, which the present model has been compiled for, in the present
- * phase of the walk: the plan keeps its state, the laws begin anew, and the joint commands fade
- * over from the last ones. before: the paths' model of the present gait under the control before.
+/* Goes on under another control, which the present model has been compiled for,
+ * in the present phase of the walk: the plan keeps its state, the laws begin
+ * anew, and the joint commands fade over from the last ones. before: the paths'
+ * model of the present gait under the control before.
  */
 void hx_controller_exchange(hxControllerModel *model, const hxFootPathsModel *before,
                             hxControllerState *state);
 
-/* Checks the range of every number of an input. On failure message says which value was got and
- * what was expected. */
+/* Checks the range of every number of an input. On failure message says which
+ * value was got and what was expected. */
 hxStatus hx_controller_input_check(const hxControllerInput *input, char *message);
 
 /* Computes one tick; state->output then holds the commands for this input. */
