@@ -11,17 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.identify.experiment import Experiment
-from hexapod_cosim.extensions.identify.fitting.least_squares import UNLIKE
-from hexapod_cosim.extensions.identify.fitting.problem import Problem
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 SMALLEST = 1e-9  # noise, in the units of the channels
 CLIPPED = 5.0  # deviations    of a residual in the test whether the model explains the log
 # Largest mean square of residuals over that of the readings' noise, of many readings. That of the
 # noise has a relative deviation of about 3.8 over the root of their number.
 EXPLAINED = 1.1
-REJECTED = 2.0  # likewise: errors of the model are as large as the noise, and move all numbers
 UNCERTAIN, DEVIATIONS = 3.8, 3.0
+DETERMINED = 0.5  # of the prior deviation: a number with less is determined by the logs
+NEARLY_NULL = 4.0  # information [1/prior^2] of a combination: a deviation of half of a prior
+# deviation of a number by nearly null combinations alone, from which on it is not determined
+BY_NULL = 1.0 / 3.0  # priors
 
 
 @dataclass(frozen=True)
@@ -34,16 +36,7 @@ class Misfit:
     @property
     def explained(self) -> bool:
         """Whether the noise of the readings may be all of it."""
-        return self.value <= EXPLAINED + self._uncertain
-
-    @property
-    def rejected(self) -> bool:
-        """Whether errors of the model are as large as the noise."""
-        return self.value > REJECTED + self._uncertain
-
-    @property
-    def _uncertain(self) -> float:
-        return DEVIATIONS * UNCERTAIN / float(np.sqrt(self.readings))
+        return self.value <= EXPLAINED + DEVIATIONS * UNCERTAIN / float(np.sqrt(self.readings))
 
 
 def read_noise(experiments: Sequence[Experiment]) -> dict[str, float]:
@@ -86,53 +79,12 @@ def misfits(
     }
 
 
-Flags = NDArray[np.bool_]
-DETERMINED = 0.5  # of the prior deviation: a number with less is determined by the logs
-NEARLY_NULL = 1.0  # information [1/prior^2] of a combination: less than what was known before
-# deviation of a number by nearly null combinations alone, from which on it is not determined
-BY_NULL = 1.0 / 3.0  # priors
-WEAK = 1000.0  # information [1/prior^2] of a combination that is simulated as a whole
-LEAST = 0.05  # information [1/prior^2] of a combination that says nothing whatever its errors are
-LONGEST = 0.5  # priors    of such a move
-PART = 0.05  # slope of a number by another one, from which on it depends on it
-
-
-def sharpened(problem: Problem, z: Array, jacobian: Array, information: Array) -> Array:
-    """Returns the derivatives with those by weak combinations from simulations over long steps.
-
-    Over a long step readings may jump: where both derivatives differ, the smaller one counts.
-
-    Args:
-        problem: its readings that count.
-        z: the numbers (rows,).
-        jacobian: derivatives of the residuals, with the priors behind them.
-        information: what these say (rows, rows).
-
-    A combination whose simulation fails stays as it is.
-    """
-    found = jacobian.copy()
-    count = len(jacobian) - len(z)
-    low, high = problem.bounds()
-    values, vectors = np.linalg.eigh(information)
-    for value, vector in zip(values.tolist(), vectors.T, strict=True):
-        if not LEAST < value < WEAK:
-            continue
-        step = min(LONGEST, value**-0.5) * vector
-        forth, back = (np.clip(z + sign * step, low, high) for sign in (1.0, -1.0))
-        change = (problem.residuals(forth) - problem.residuals(back))[:count]
-        linear, length = jacobian[:count] @ (forth - back), float((forth - back) @ vector)
-        if length <= 0.0 or not np.isfinite(change).all():
-            continue
-        smaller = np.where(np.abs(change) < np.abs(linear), change, linear)
-        differ = np.abs(change - linear) > UNLIKE * np.abs(smaller)
-        shown = np.where(differ, smaller, change)
-        if shown @ shown < linear @ linear:  # more is what bends or jumps over the long step
-            found[:count] += np.outer((shown - linear) / length, vector)
-    return found
-
-
 def determined(information: Array) -> Flags:
-    """Returns which numbers readings of an information (rows, rows) determine (rows,)."""
+    """Returns which numbers readings of an information (rows, rows) determine (rows,).
+
+    These have at most half of the deviation that they had before, and no large share in a
+    combination of numbers with a larger deviation than that.
+    """
     covariance = np.linalg.inv(information + np.eye(len(information)))
     small = np.sqrt(np.diag(covariance)) < DETERMINED
     values, vectors = np.linalg.eigh(information)
@@ -155,21 +107,3 @@ def to_keep(information: Array, candidates: Flags) -> Flags:
             return kept
         deviations = np.diag(np.linalg.inv(own + np.eye(len(own))))
         kept[free[int(np.argmax(np.where(open_ones, deviations, -1.0)))]] = True
-
-
-def dependences(information: Array, kept: Flags, candidates: Flags) -> dict[int, list[int]]:
-    """Returns the numbers that readings determine only together with kept ones, and these.
-
-    kept: numbers that stay at the file's values. candidates: numbers that may depend on them.
-    """
-    free, others = np.flatnonzero(~kept), np.flatnonzero(kept)
-    if not len(others):
-        return {}
-    covariance = np.linalg.inv(information[np.ix_(free, free)] + np.eye(len(free)))
-    slopes = covariance @ information[np.ix_(free, others)]
-    alone = determined(information)
-    return {
-        k: others[np.abs(own) > PART].tolist()
-        for k, own in zip(free.tolist(), slopes, strict=True)
-        if candidates[k] and not alone[k]
-    }
