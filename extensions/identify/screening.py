@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 MOST_MISSING = 0.1  # of the rows
 LONGEST_STUCK = 0.1  # of the rows
 MOVES = 0.2  # of a column's spread: what a simulation changes while a reading is stuck
-FOLLOWS, AGAINST = 0.5, -0.8  # correlations of readings with the simulation
+FOLLOWS, AGAINST = 0.5, -0.6  # correlations of readings with the simulation
 DEGREES = (30.0, 110.0)  # readings over simulation: 57.3 within a factor of 1.9
 UNIT = 30.0  # a column that is larger or smaller by this factor has another unit
 # Least deviation of a simulated column whose sign is judged: a robot that walks straight drifts to

@@ -4,6 +4,8 @@ that readings do not determine, and readings that jump.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -22,6 +24,7 @@ from hexapod_cosim.extensions.identify.fitting.least_squares import (
 )
 from hexapod_cosim.extensions.identify.fitting.misfit import (
     determined,
+    sharpened,
     to_keep,
 )
 from hexapod_cosim.extensions.identify.identification import QUANTILE, Estimate
@@ -131,6 +134,36 @@ def test_what_readings_determine_well_stays_so() -> None:
     assert determined(information).all()
     assert not to_keep(information, ALL_THREE).any()
     assert determined(np.diag([1e4, 100.0, 2.9])).tolist() == [True, True, False]
+
+
+class Noisy:
+    """Stands for a problem of three numbers whose readings show 2 z1 - z2 and z3, with derivatives
+    that have errors of 0.01 deviations.
+    """
+
+    def __init__(self) -> None:
+        rng = np.random.default_rng(3)
+        self.matrix = np.zeros((10_000, 3))
+        self.matrix[:, :2] = np.outer(rng.normal(size=10_000), [2.0, -1.0])
+        self.matrix[:, 2] = rng.normal(size=10_000)
+        self.slopes = self.matrix + 0.01 * rng.normal(size=self.matrix.shape)
+
+    def bounds(self) -> tuple[Array, Array]:
+        return np.full(3, -8.0), np.full(3, 8.0)
+
+    def residuals(self, z: Array) -> Array:
+        return np.concatenate([self.matrix @ z, z])
+
+
+def test_errors_of_derivatives_are_no_information() -> None:
+    problem: Any = Noisy()
+    false = problem.slopes.T @ problem.slopes
+    jacobian = np.vstack([problem.slopes, np.eye(3)])
+    found = sharpened(problem, np.zeros(3), jacobian, false)[:-3]
+    assert np.linalg.eigvalsh(false)[0] == pytest.approx(1.0, rel=0.1)  # 10^4 errors of 0.01
+    assert np.linalg.eigvalsh(found.T @ found)[0] < 1e-3
+    expected = np.linalg.eigvalsh(false)[1:]
+    assert np.linalg.eigvalsh(found.T @ found)[1:] == pytest.approx(expected, rel=1e-3)
 
 
 def test_a_difference_over_a_jump_is_bent_and_one_of_a_curve_is_not() -> None:

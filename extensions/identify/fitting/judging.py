@@ -22,6 +22,7 @@ from hexapod_cosim.extensions.identify.fitting.misfit import (
     determined,
     misfits,
     read_noise,
+    sharpened,
     to_keep,
 )
 from hexapod_cosim.extensions.identify.fitting.problem import Problem
@@ -32,8 +33,8 @@ from hexapod_cosim.extensions.identify.unknowns import OF_FILE
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Progress = Callable[[str], None]
-# Errors of the integrator look like information in differences of simulations.
-EXACT = {"solver.tolerance": 1e-6}
+# of deriving weak combinations anew: the first errors of derivatives hide some in others
+PASSES = 4
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,6 @@ def fit(problem: Problem, *, progress: Progress = lambda _text: None) -> Fit:
     fitted, best = searched(problem, progress)
     progress("what the log determines")
     least = read_noise(fitted.experiments)
-    fitted.use(EXACT)
     own = _evidence(fitted, best, least)
     kept = to_keep(own.information, np.array([row.group in OF_FILE for row in problem.rows]))
     z = np.where(kept, 0.0, best)
@@ -137,5 +137,9 @@ def _evidence(fitted: Problem, z: Array, least: Mapping[str, float]) -> _Evidenc
     misfit = misfits(fitted.experiments, fitted.predictions(z), least, "fitted")
     # errors of the model count as noise
     worst = max(1.0, *(one.value for one in misfit.values()))
-    series = fitted.series(jacobian, np.clip(residuals, -BOUND, BOUND))
-    return _Evidence(jacobian, residuals, misfit, coloured_information(series) / worst)
+    bounded, far = np.clip(residuals, -BOUND, BOUND), jacobian
+    information = coloured_information(fitted.series(far, bounded)) / worst
+    for _ in range(PASSES):
+        far = sharpened(fitted, z, far, information)
+        information = coloured_information(fitted.series(far, bounded)) / worst
+    return _Evidence(jacobian, residuals, misfit, information)

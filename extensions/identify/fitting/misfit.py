@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.identify.experiment import Experiment
+from hexapod_cosim.extensions.identify.fitting.least_squares import UNLIKE
+from hexapod_cosim.extensions.identify.fitting.problem import Problem
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -21,9 +23,12 @@ CLIPPED = 5.0  # deviations    of a residual in the test whether the model expla
 EXPLAINED = 1.1
 UNCERTAIN, DEVIATIONS = 3.8, 3.0
 DETERMINED = 0.5  # of the prior deviation: a number with less is determined by the logs
-NEARLY_NULL = 4.0  # information [1/prior^2] of a combination: a deviation of half of a prior
+NEARLY_NULL = 1.0  # information [1/prior^2] of a combination: less than what was known before
 # deviation of a number by nearly null combinations alone, from which on it is not determined
 BY_NULL = 1.0 / 3.0  # priors
+WEAK = 1000.0  # information [1/prior^2] of a combination that is simulated as a whole
+LEAST = 0.05  # information [1/prior^2] of a combination that says nothing whatever its errors are
+LONGEST = 0.5  # priors    of such a move
 
 
 @dataclass(frozen=True)
@@ -79,11 +84,45 @@ def misfits(
     }
 
 
+def sharpened(problem: Problem, z: Array, jacobian: Array, information: Array) -> Array:
+    """Returns the derivatives with those by weak combinations from simulations over long steps.
+
+    Over a long step readings may jump: where both derivatives differ, the smaller one counts.
+
+    Args:
+        problem: its readings that count.
+        z: the numbers (rows,).
+        jacobian: derivatives of the residuals, with the priors behind them.
+        information: what these say (rows, rows).
+
+    A combination whose simulation fails stays as it is.
+    """
+    found = jacobian.copy()
+    count = len(jacobian) - len(z)
+    low, high = problem.bounds()
+    values, vectors = np.linalg.eigh(information)
+    for value, vector in zip(values.tolist(), vectors.T, strict=True):
+        if not LEAST < value < WEAK:
+            continue
+        step = min(LONGEST, value**-0.5) * vector
+        forth, back = (np.clip(z + sign * step, low, high) for sign in (1.0, -1.0))
+        change = (problem.residuals(forth) - problem.residuals(back))[:count]
+        linear, length = jacobian[:count] @ (forth - back), float((forth - back) @ vector)
+        if length <= 0.0 or not np.isfinite(change).all():
+            continue
+        smaller = np.where(np.abs(change) < np.abs(linear), change, linear)
+        differ = np.abs(change - linear) > UNLIKE * np.abs(smaller)
+        shown = np.where(differ, smaller, change)
+        if shown @ shown < linear @ linear:  # more is what bends or jumps over the long step
+            found[:count] += np.outer((shown - linear) / length, vector)
+    return found
+
+
 def determined(information: Array) -> Flags:
     """Returns which numbers readings of an information (rows, rows) determine (rows,).
 
     These have at most half of the deviation that they had before, and no large share in a
-    combination of numbers with a larger deviation than that.
+    combination of numbers of which the readings say less than was known.
     """
     covariance = np.linalg.inv(information + np.eye(len(information)))
     small = np.sqrt(np.diag(covariance)) < DETERMINED
