@@ -9,8 +9,7 @@
 #include "walk/foot_paths.h"
 #include <string.h>
 
-/* One planned step. It depends on the command alone. Feet are in the walking
- * frame. */
+/* One planned step. It depends on the command alone. Feet are in the walking frame. */
 typedef struct hxPlannedStep {
   double value[HX_COMMANDS],
       rate[HX_COMMANDS]; /* vx vy yaw_rate height roll pitch, and per second */
@@ -28,8 +27,7 @@ typedef struct hxPlannedStep {
 
 /* Constants of the plan of a step. */
 typedef struct hxStepPlanner {
-  int compliant; /* compliant control, which lowers feet; otherwise there are no
-                    laws */
+  int compliant; /* compliant control, which lowers feet; otherwise there are no laws */
   hxLegSolver leg[HX_LEGS];
   hxCompliantModel laws;
   hxSway sway;
@@ -44,8 +42,8 @@ static inline void hx_step_planner_compile(const hxControllerDefinition *definit
   hx_sway_compile(definition, model->leg, &model->laws.dynamics, &model->sway);
 }
 
-/* Computes the activations of the legs, and lowers the feet by the depth to
- * which the ground will deform under their loads. */
+/* Computes the activations of the legs, and lowers the feet by the depth to which the ground will
+ * deform under their loads. */
 static inline void lower(const hxStepPlanner *model, const hxGaitClock *clock,
                          hxPlannedStep *step) {
   const hxSupport *support = &model->laws.support;
@@ -62,8 +60,7 @@ static inline void lower(const hxStepPlanner *model, const hxGaitClock *clock,
   for (int k = 0; k < HX_LEGS; ++k) step->height[k] = step->feet.height[k] - step->lowering[k];
 }
 
-/* Computes the poses of legs whose contact points are shifted from the planned
- * feet. */
+/* Computes the poses of legs whose contact points are shifted from the planned feet. */
 static inline void reach_all(const hxLegSolver leg[HX_LEGS], const hxPlane shift[HX_LEGS],
                              hxPlannedStep *step) {
   hxPlane seen[HX_LEGS];
@@ -76,11 +73,10 @@ static inline void reach_all(const hxLegSolver leg[HX_LEGS], const hxPlane shift
   hx_leg_solver_poses(leg, (const hxPlane *)seen, (const double *)z, step->pose);
 }
 
-/* Computes by how far the feet's contact points shift because their spheres
- * roll (C9), and the poses of the legs. A tibia that pitches by dB rolls the
- * sphere by -R dB along the outward direction of the leg. The shift s changes B
- * itself: s = R (C + s dC/du) is solved by one Newton step. What is rolled on
- * the way to another position than that of the stance is no shift. */
+/* Computes by how far the feet's contact points shift because their spheres roll (C9), and the
+ * poses of the legs. A tibia that pitches by dB rolls the sphere by -R dB along the outward
+ * direction of the leg. The shift s changes B itself: s = R (C + s dC/du) is solved by one Newton
+ * step. What is rolled on the way to another position than that of the stance is no shift. */
 static inline void place_legs(const hxLegSolver leg[HX_LEGS], hxPlannedStep *step) {
   const hxPlane none[HX_LEGS] = {{0.0, 0.0}};
   reach_all(leg, none, step);
@@ -95,8 +91,7 @@ static inline void place_legs(const hxLegSolver leg[HX_LEGS], hxPlannedStep *ste
   reach_all(leg, (const hxPlane *)step->shift, step);
 }
 
-/* Computes the poses of the legs and the point masses for a torso that has
- * moved. */
+/* Computes the poses of the legs and the point masses for a torso that has moved. */
 static inline void stand(const hxStepPlanner *model, const hxGaitClock *clock,
                          hxPlannedStep *step) {
   for (int k = 0; k < HX_LEGS; ++k) step->plane[k] = hx_plane_sub(step->feet.plane[k], step->torso);
@@ -109,8 +104,8 @@ static inline void stand(const hxStepPlanner *model, const hxGaitClock *clock,
                             &step->posture, &step->masses);
 }
 
-/* Computes way of the torso, poses of the legs and point masses for planned
- * feet. clock: of the gait, in the section of the step. */
+/* Computes way of the torso, poses of the legs and point masses for planned feet. clock: of the
+ * gait, in the section of the step. */
 static inline void hx_step_planner_lay_out(const hxStepPlanner *model, const hxGaitClock *clock,
                                            const hxLoadAdaptation *adaptation,
                                            hxPlannedStep *step) {
@@ -124,8 +119,7 @@ static inline void hx_step_planner_lay_out(const hxStepPlanner *model, const hxG
   stand(model, clock, step);
 }
 
-/* Returns the weight that moves with the torso over the modelled one [1] (C53).
- */
+/* Returns the weight that moves with the torso over the modelled one [1] (C53). */
 static inline double hx_step_planner_laden(const hxStepPlanner *model,
                                            const hxLoadAdaptation *adaptation) {
   return hx_sway_laden(&model->sway, adaptation);

@@ -1,5 +1,4 @@
-/* sway.h - sway of the torso against the swinging legs (C54). Python:
- * controller/comply/sway.py. */
+/* sway.h - sway of the torso against the swinging legs (C54). Python: controller/comply/sway.py. */
 #ifndef HX_SWAY_H
 #define HX_SWAY_H
 
@@ -9,8 +8,7 @@
 
 typedef struct hxSway {
   int active;            /* the part is on */
-  double forward, aside; /* 1    share of the mass that moves with all feet; 0
-                            without the part */
+  double forward, aside; /* 1    share of the mass that moves with all feet; 0 without the part */
   double mass;           /* kg    of the robot */
   hxPlane home;          /* m    sum of the feet in the stance */
   hxPlane rest;          /* kg m    sum of m p of all links in the stance */
@@ -19,8 +17,7 @@ typedef struct hxSway {
 /* m, by which all feet are moved to find the mass that moves with them */
 static const double reach = 1e-3;
 
-/* Returns the sum of m p of all links with all feet moved from the stance [kg
- * m]. */
+/* Returns the sum of m p of all links with all feet moved from the stance [kg m]. */
 static inline hxPlane moment_of(const hxInverseDynamics *dynamics, const hxLegSolver leg[HX_LEGS],
                                 hxPlane step) {
   const double zero[3] = {0.0};
@@ -42,8 +39,7 @@ static inline hxPlane moment_of(const hxInverseDynamics *dynamics, const hxLegSo
   return sum;
 }
 
-/* Returns the share of the mass that moves with all feet, in a direction of
- * length `reach`. */
+/* Returns the share of the mass that moves with all feet, in a direction of length `reach`. */
 static inline double share_of(const hxInverseDynamics *dynamics, const hxLegSolver leg[HX_LEGS],
                               hxPlane way) {
   const hxPlane moved =
@@ -80,8 +76,7 @@ static inline double hx_sway_laden(const hxSway *model, const hxLoadAdaptation *
   return model->active ? hx_load_adaptation_laden(adaptation) : 1.0;
 }
 
-/* Returns the way of the torso that gives the robot another sum of m p [kg m].
- */
+/* Returns the way of the torso that gives the robot another sum of m p [kg m]. */
 static inline hxPlane yield_to(const hxSway *model, hxPlane moment,
                                const hxLoadAdaptation *adaptation) {
   const double laden = hx_load_adaptation_laden(adaptation);
@@ -89,8 +84,7 @@ static inline hxPlane yield_to(const hxSway *model, hxPlane moment,
                   moment.y / (model->mass * (laden - model->aside)));
 }
 
-/* Returns nearly the whole way of the torso in the walking frame, by the shares
- * [m]. */
+/* Returns nearly the whole way of the torso in the walking frame, by the shares [m]. */
 static inline hxPlane hx_sway_guess(const hxSway *model, const hxPlannedFeet *feet,
                                     const hxLoadAdaptation *adaptation) {
   const double mass = model->mass / HX_LEGS;
@@ -100,8 +94,8 @@ static inline hxPlane hx_sway_guess(const hxSway *model, const hxPlannedFeet *fe
   return hx_scaled(yield_to(model, away, adaptation), -1.0);
 }
 
-/* Returns the way of the torso in the walking frame [m] (C54). masses: of a
- * torso that has moved by the guess. */
+/* Returns the way of the torso in the walking frame [m] (C54). masses: of a torso that has moved by
+ * the guess. */
 static inline hxPlane hx_sway_of(const hxSway *model, const hxInverseDynamics *dynamics,
                                  hxPlane guess, const hxMasses *masses,
                                  const hxLoadAdaptation *adaptation) {

@@ -1,5 +1,5 @@
-/* landing.h - heights above the ends of their paths at which feet meet the
- * ground. Python: controller/sense/landing.py. */
+/* landing.h - heights above the ends of their paths at which feet meet the ground. Python:
+ * controller/sense/landing.py. */
 #ifndef HX_LANDING_H
 #define HX_LANDING_H
 
@@ -8,8 +8,7 @@
 #include <math.h>
 
 typedef struct hxLandings {
-  /* m, height of each foot's path above its end at the last landing; infinite
-   * before the first one
+  /* m, height of each foot's path above its end at the last landing; infinite before the first one
    */
   double met[HX_LEGS];
   double before[HX_LEGS]; /* m, the same at the landing before; 0 until then */
@@ -44,8 +43,8 @@ static inline void hx_landings_look(const int touching[HX_LEGS], const double he
   }
 }
 
-/* Computes the height at which each foot meets the ground without a bump (C35)
- * [m]; 0 while it is unknown. */
+/* Computes the height at which each foot meets the ground without a bump (C35) [m]; 0 while it is
+ * unknown. */
 static inline void hx_landings_expected(const hxLandings *landings, const int touching[HX_LEGS],
                                         const double height[HX_LEGS], const int swinging[HX_LEGS],
                                         double expected[HX_LEGS]) {
@@ -56,8 +55,8 @@ static inline void hx_landings_expected(const hxLandings *landings, const int to
     expected[leg] = fmax(least_of_others(known, leg), landings->before[leg]);
 }
 
-/* Finds the feet that met the ground early and are still above the height at
- * which feet met it before (C36). */
+/* Finds the feet that met the ground early and are still above the height at which feet met it
+ * before (C36). */
 static inline void hx_landings_early(const hxLandings *landings, const double expected[HX_LEGS],
                                      const double height[HX_LEGS], int early[HX_LEGS]) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {

@@ -35,8 +35,7 @@ static inline double faded(double offset, double period) {
   return fabs(offset) > negligible ? offset * hx_decay(-period / return_time) : 0.0;
 }
 
-/* Returns the next offset of a foot that has missed the ground for a time [s].
- */
+/* Returns the next offset of a foot that has missed the ground for a time [s]. */
 static inline double moved(double offset, double late, double period, int touching, double falling,
                            int swinging, int searching) {
   if (searching || late > grace) return fmax(offset - reach_speed * period, -hx_reach_limit);
@@ -45,11 +44,10 @@ static inline double moved(double offset, double late, double period, int touchi
   return offset;
 }
 
-/* Advances by one period [s] (C36). touching: feet that report a force;
- * falling: distance by which the path of a foot that met the ground early moves
- * down in this period [m], 0 for the others; swinging: legs planned in the air;
- * loaded: legs planned to carry their whole share; searching: feet that the
- * gait clock waits for; doubted: feet whose sensors are not trusted. */
+/* Advances by one period [s] (C36). touching: feet that report a force; falling: distance by which
+ * the path of a foot that met the ground early moves down in this period [m], 0 for the others;
+ * swinging: legs planned in the air; loaded: legs planned to carry their whole share; searching:
+ * feet that the gait clock waits for; doubted: feet whose sensors are not trusted. */
 static inline void hx_touchdown_step(double period, const int touching[HX_LEGS],
                                      const double falling[HX_LEGS], const int swinging[HX_LEGS],
                                      const int loaded[HX_LEGS], const int searching[HX_LEGS],

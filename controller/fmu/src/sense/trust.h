@@ -14,21 +14,17 @@ typedef struct hxTrustModel {
 typedef struct hxTrust {
   double level;             /* 1, factor on all torques */
   int lagging;              /* the joints cannot follow the plan */
-  double overspeed_share;   /* 1, share of the time in which the plan exceeds a
-                               speed limit */
+  double overspeed_share;   /* 1, share of the time in which the plan exceeds a speed limit */
   int64_t slide_periods;    /* steps for which the robot has been sliding */
-  int64_t recovery_periods; /* steps that remain until feedback resumes after
-                               sliding */
+  int64_t recovery_periods; /* steps that remain until feedback resumes after sliding */
 } hxTrust;
 
-/* 1, common tangential over normal force beyond the plan, which only a sliding
- * robot reaches */
+/* 1, common tangential over normal force beyond the plan, which only a sliding robot reaches */
 static const double sliding_drag = 0.55;
 /* 1, gait cycles without sliding until feet are trusted again */
 static const double calm_cycles = 0.5;
 static const double sliding_time = 0.04; /* s, longer than a foot skids at touch-down */
-/* 1, share of the time in which joints would need more speed than a servo has
- */
+/* 1, share of the time in which joints would need more speed than a servo has */
 static const double joints_follow = 0.35, joints_do_not = 0.45;
 static const double feet_late = 0.2; /* 1, the same, from which feet end their swings late */
 static const double trusted = 0.99;  /* 1, so near to its goal the trust is at it */
@@ -42,16 +38,14 @@ static inline void hx_trust_compile(const hxControllerDefinition *definition, hx
   model->calm = (int64_t)calm;
 }
 
-/* Returns whether the joints are so slow that feet end their swings late
- * anywhere. */
+/* Returns whether the joints are so slow that feet end their swings late anywhere. */
 static inline int hx_trust_feet_late(const hxTrust *trust) {
   return trust->overspeed_share > feet_late;
 }
 
-/* Advances the trust by one period (C33) and returns the level that it goes to,
- * 0 or 1. drag: the common tangential force of the feet beyond the plan, over
- * the normal force; overspeed: the plan exceeds the speed limit of some joint;
- * overburdened: the robot is far too heavy for its servos.
+/* Advances the trust by one period (C33) and returns the level that it goes to, 0 or 1. drag: the
+ * common tangential force of the feet beyond the plan, over the normal force; overspeed: the plan
+ * exceeds the speed limit of some joint; overburdened: the robot is far too heavy for its servos.
  */
 static inline double hx_trust_step(const hxTrustModel *model, double drag, int overspeed,
                                    int overburdened, hxTrust *trust) {
