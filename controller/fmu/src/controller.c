@@ -114,8 +114,8 @@ static void present_step(const hxControllerModel *model, hxControllerState *stat
   double height[HX_LEGS];
   hxDemand demand;
   hx_inverse_dynamics_demand(&planner->laws.dynamics, planner->leg, &motion, output->speed_ref,
-                             &now->posture,
-                             hx_step_planner_laden(planner, &state->compliant.adaptation), &demand);
+                             &now->posture, hx_step_planner_laden(planner, &state->compliant),
+                             &demand);
   load->overspeed = 0;
   for (int k = 0; k < HX_LEGS; ++k) {
     load->feet[k] = hx_plane_add(now->plane[k], now->shift[k]);

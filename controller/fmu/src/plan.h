@@ -60,7 +60,7 @@ static inline void hx_walk_plan_reset(const hxWalkPlanModel *model, const hxComp
   plan->cut = 1;
   hx_foot_paths_reset(&model->paths, &plan->paths, &step->feet);
   look_ahead(model, laws, plan, 0, 0, step);
-  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, &laws->adaptation, step);
+  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, step);
 }
 
 /* Plans the step a number of periods after the section began. before: the step before it. */
@@ -69,7 +69,7 @@ static inline void plan_step(const hxWalkPlanModel *model, const hxCompliant *la
                              hxPlannedStep *step) {
   const hxTwist twist = look_ahead(model, laws, plan, 1, number, step);
   hx_foot_paths_walk(&model->paths, &plan->paths, number, twist, &before->feet, &step->feet);
-  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, &laws->adaptation, step);
+  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, step);
 }
 
 /* ----------------------------------------------------------------------------------- sections */
@@ -112,7 +112,7 @@ static inline void plan_afresh(const hxWalkPlanModel *model, int waiting, hxComp
   else
     hx_foot_paths_plan(&model->paths, &now, plan->at, moves || !settled, twist, &plan->paths,
                        &first->feet);
-  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, &laws->adaptation, first);
+  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, first);
   plan->last = moves || settled ? INT64_MAX : model->ramp.end - plan->ramp.steps;
   plan->at = 0;
   plan_step(model, laws, plan, 1, first, hx_walk_plan_step(plan, 1));

@@ -42,24 +42,6 @@ static inline void hx_step_planner_compile(const hxControllerDefinition *definit
   hx_sway_compile(definition, model->leg, &model->laws.dynamics, &model->sway);
 }
 
-/* Computes the activations of the legs, and lowers the feet by the depth to which the ground will
- * deform under their loads. */
-static inline void lower(const hxStepPlanner *model, const hxGaitClock *clock,
-                         hxPlannedStep *step) {
-  const hxSupport *support = &model->laws.support;
-  memset(step->lowering, 0, sizeof step->lowering);
-  for (int k = 0; k < HX_LEGS; ++k) {
-    step->activation[k] = 1.0;
-    if (model->compliant)
-      step->activation[k] =
-          clock->awaited[k] ? 0.0
-                            : hx_support_activation(support, step->feet.phase[k], clock->stayed[k],
-                                                    clock->stays[k], clock->walking);
-  }
-  if (model->compliant) hx_support_lowering(support, step->plane, step->activation, step->lowering);
-  for (int k = 0; k < HX_LEGS; ++k) step->height[k] = step->feet.height[k] - step->lowering[k];
-}
-
 /* Computes the poses of legs whose contact points are shifted from the planned feet. */
 static inline void reach_all(const hxLegSolver leg[HX_LEGS], const hxPlane shift[HX_LEGS],
                              hxPlannedStep *step) {
@@ -95,7 +77,14 @@ static inline void place_legs(const hxLegSolver leg[HX_LEGS], hxPlannedStep *ste
 static inline void stand(const hxStepPlanner *model, const hxGaitClock *clock,
                          hxPlannedStep *step) {
   for (int k = 0; k < HX_LEGS; ++k) step->plane[k] = hx_plane_sub(step->feet.plane[k], step->torso);
-  lower(model, clock, step);
+  if (model->compliant) {
+    hx_compliant_lowered(&model->laws, clock, step->feet.phase, step->plane, step->activation,
+                         step->lowering);
+  } else {
+    memset(step->lowering, 0, sizeof step->lowering);
+    for (int k = 0; k < HX_LEGS; ++k) step->activation[k] = 1.0;
+  }
+  for (int k = 0; k < HX_LEGS; ++k) step->height[k] = step->feet.height[k] - step->lowering[k];
   place_legs(model->leg, step);
   if (!model->compliant) return;
   const hxPlane turn = hx_cis(step->feet.turn);
@@ -107,22 +96,23 @@ static inline void stand(const hxStepPlanner *model, const hxGaitClock *clock,
 /* Computes way of the torso, poses of the legs and point masses for planned feet. clock: of the
  * gait, in the section of the step. */
 static inline void hx_step_planner_lay_out(const hxStepPlanner *model, const hxGaitClock *clock,
-                                           const hxLoadAdaptation *adaptation,
-                                           hxPlannedStep *step) {
+                                           const hxCompliant *laws, hxPlannedStep *step) {
   const hxSway *sway = &model->sway;
+  const double narrowing = laws->adaptation.narrowing;
   step->torso = hx_plane(0.0, 0.0);
-  if (model->compliant && hx_sway_acts(sway, adaptation)) {
-    step->torso = hx_sway_guess(sway, &step->feet, adaptation);
+  if (model->compliant && hx_sway_acts(sway, narrowing)) {
+    const double laden = hx_load_adaptation_laden(&laws->adaptation);
+    step->torso = hx_sway_guess(sway, &step->feet, laden);
     stand(model, clock, step);
-    step->torso = hx_sway_of(sway, &model->laws.dynamics, step->torso, &step->masses, adaptation);
+    step->torso = hx_scaled(
+        hx_sway_of(sway, &model->laws.dynamics, step->torso, &step->masses, laden), narrowing);
   }
   stand(model, clock, step);
 }
 
 /* Returns the weight that moves with the torso over the modelled one [1] (C53). */
-static inline double hx_step_planner_laden(const hxStepPlanner *model,
-                                           const hxLoadAdaptation *adaptation) {
-  return hx_sway_laden(&model->sway, adaptation);
+static inline double hx_step_planner_laden(const hxStepPlanner *model, const hxCompliant *laws) {
+  return model->sway.active ? hx_load_adaptation_laden(&laws->adaptation) : 1.0;
 }
 
 #endif

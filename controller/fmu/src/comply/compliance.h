@@ -5,7 +5,6 @@
 
 #include "../sense/burden.h"
 #include "../sense/contact_detection.h"
-#include "../sense/landing.h"
 #include "../sense/touchdown.h"
 #include "../sense/trust.h"
 #include "load_plan.h"
@@ -100,6 +99,15 @@ static inline void hx_compliance_reset(hxCompliance *laws) {
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->grip[leg] = 1.0;
 }
 
+/* Returns measured over modelled weight [1] (C32). */
+static inline double hx_compliance_heft(const hxCompliance *laws) { return laws->burden.heft; }
+
+/* Returns the torque needed for the measured weight over the torque allowed [1]. */
+static inline double hx_compliance_needed(const hxComplianceModel *model,
+                                          const hxCompliance *laws) {
+  return laws->burden.heft * laws->burden.peak / model->most;
+}
+
 /* ----------------------------------------------------------------------------------- contacts */
 
 /* Replaces the forces of sensors that are not trusted by the planned ones. */
@@ -148,7 +156,7 @@ static inline void meet_ground(const hxComplianceModel *model, const hxLoadPlan 
   laws->regaining = 1;
   hx_landings_early(&laws->landings, met, plan->height, early);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    falling[leg] = early[leg] ? plan->falling[leg] : 0.0;
+    falling[leg] = early[leg] ? plan->descent[leg] : 0.0;
     searching[leg] = plan->awaited[leg] && !laws->doubted[leg] && !carries(laws, leg);
   }
   hx_touchdown_step(model->period, laws->touching, falling, plan->swinging, plan->standing,
@@ -172,7 +180,7 @@ static inline int contacts_differ(const hxLoadPlan *plan, const hxCompliance *la
   int found = hx_sensor_watch_busy(&laws->watch) || hx_touchdown_busy(&laws->touchdown);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     found |= plan->awaited[leg] || (laws->touching[leg] != plan->standing[leg] &&
-                                    (plan->standing[leg] || plan->well_up[leg]));
+                                    (plan->standing[leg] || plan->height[leg] > hx_early));
   return found;
 }
 

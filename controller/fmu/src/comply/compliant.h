@@ -4,10 +4,12 @@
 #define HX_COMPLIANT_H
 
 #include "../sense/load_adaptation.h"
+#include "../walk/gait_clock.h"
 #include "../walk/hold.h"
 #include "../walk/swing.h"
 #include "compliance.h"
 #include "planned_squeeze.h"
+#include "support.h"
 #include <string.h>
 
 typedef struct hxCompliantModel {
@@ -103,7 +105,10 @@ static inline void hx_compliant_compile(const hxControllerDefinition *definition
   hx_planned_squeeze_compile(definition, model->laws.weight, -model->dynamics.floor,
                              &model->squeeze);
   hx_hold_compile(definition, &model->hold);
-  hx_load_adaptation_compile(definition, &model->adaptation);
+  const hxParts *parts = &definition->parts;
+  hx_load_adaptation_compile(definition, parts->support ? parts->squeeze : 0.0,
+                             parts->support && definition->gait.narrowing > 0.0,
+                             &model->adaptation);
 }
 
 static inline void hx_compliant_reset(const hxCompliantModel *model, hxCompliant *compliant) {
@@ -123,6 +128,20 @@ static inline void hx_compliant_plan(const hxCompliantModel *model, const hxComp
   hx_planned_squeeze_add(&model->squeeze, plan->feet, demand, compliant->adaptation.squeeze,
                          &plan->shares);
   hx_plan_load(model->support.active, model->period, demand, height, rise, plan);
+}
+
+/* Computes the activations of the legs and the lowering of their feet [m] by the depth to which the
+ * ground will deform under their loads. phase: of the legs; plane: feet, walking frame [m]; clock:
+ * of the gait, in the section of the step. */
+static inline void hx_compliant_lowered(const hxCompliantModel *model, const hxGaitClock *clock,
+                                        const double phase[HX_LEGS], const hxPlane plane[HX_LEGS],
+                                        double activation[HX_LEGS], double lowering[HX_LEGS]) {
+  for (int k = 0; k < HX_LEGS; ++k)
+    activation[k] = clock->awaited[k]
+                        ? 0.0
+                        : hx_support_activation(&model->support, phase[k], clock->stayed[k],
+                                                clock->stays[k], clock->walking);
+  hx_support_lowering(&model->support, plane, activation, lowering);
 }
 
 /* ----------------------------------------------------------------------------------- steering */
@@ -230,8 +249,8 @@ static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegS
     output->lift[k] = raised;
   }
   if (busy || compliant->moving) compliant->moving = busy;
-  const double needed = laws->burden.heft * laws->burden.peak / model->laws.most;
-  hx_load_adaptation_weigh(&model->adaptation, laws->burden.heft, &compliant->adaptation);
+  const double needed = hx_compliance_needed(&model->laws, laws);
+  hx_load_adaptation_weigh(&model->adaptation, hx_compliance_heft(laws), &compliant->adaptation);
   hx_load_adaptation_step(&model->adaptation, (const double (*)[HX_JOINTS])laws->torque, needed,
                           laws->held, &compliant->adaptation);
 }
