@@ -8,7 +8,6 @@ from typing import Any
 
 from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table, show_text
 from hexapod_cosim.cosim.common.files import named
-from hexapod_cosim.cosim.scenario.sections import read_terrain_keys
 from hexapod_cosim.cosim.scenario.tables import parse_value
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
 from hexapod_cosim.models.ground.parameters import DIFFICULTY, Parameter
@@ -89,7 +88,7 @@ def surface_from(name: str, values: Iterable[str]) -> Surface:
                 where=name,
             )
         table[key.removeprefix(PREFIX)] = parse_value(value)
-    surface = read_terrain(read_terrain_keys(table, "terrain"), "terrain").surface
+    surface = read_terrain(table, "terrain").surface
     assert surface is not None  # each entry of the catalogue has one
     return surface
 
