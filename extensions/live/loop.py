@@ -84,7 +84,7 @@ class Loop:
             self._pause(left)
         self.step()
         self.pacer.note_step()
-        if self.pacer.lateness.steps % max(round(FRAME / self.robot.h), 1) == 0:
+        if self.pacer.steps % max(round(FRAME / self.robot.h), 1) == 0:
             self._publish_if_new("status", self.status())
             self._publish_frame()
 

@@ -224,7 +224,6 @@ class LiveRobot(Closing):
         if passed == round(change.begin / self.h):
             self._tune(self.plan, "gait.")
             self._gait = pending.gait
-        if passed == round(change.settled / self.h):
             self.settings = replace(self.settings, gait=pending.gait.name)
         if passed == round(change.end / self.h):
             self.limits, self._pending = find_limits(self.plan.controller.robot, self._gait), None

@@ -36,8 +36,8 @@ export class RobotModel extends Group {
     this.feet = robot.legs.map(() => this.makeFoot());
   }
 
-  /** Moves the robot into a pose; `touching` tells which feet light up. */
-  place(pose: Pose, touching: readonly boolean[]): void {
+  /** Moves the robot into a pose; feet in contact light up. */
+  place(pose: Pose, inContact: readonly boolean[]): void {
     this.torso.position.copy(torsoOrigin(this.robot, pose));
     this.torso.quaternion.copy(pose.attitude);
     this.links.forEach((links, leg) => {
@@ -47,14 +47,9 @@ export class RobotModel extends Group {
       });
       const foot = this.feet[leg];
       foot.position.copy(points[3]);
-      foot.material.color.copy(touching[leg] ? LIT : DARK);
-      foot.material.emissive.copy(LIT).multiplyScalar(touching[leg] ? 0.55 : 0);
+      foot.material.color.copy(inContact[leg] ? LIT : DARK);
+      foot.material.emissive.copy(LIT).multiplyScalar(inContact[leg] ? 0.55 : 0);
     });
-  }
-
-  /** Returns which feet are lit. */
-  lit(): boolean[] {
-    return this.feet.map(({ material }) => material.emissive.getHex() !== 0);
   }
 
   private makeTorso(mark: Color): void {
