@@ -30,7 +30,7 @@ def report(
     ],
     json: Json = False,
 ) -> None:
-    """Make the plots and the report of a folder of results again."""
+    """Make the report of a folder of results again, with figures as PNG too."""
     from hexapod_cosim.cosim.report.writing import REPORT
     from hexapod_cosim.cosim.results.folder import damage_reported, read_facts
 
@@ -46,7 +46,7 @@ def report(
 def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     """Writes the report of a folder again; `facts` are those of its run.json."""
     from hexapod_cosim.cosim.cli.extension import loaded, report_functions
-    from hexapod_cosim.cosim.report.writing import write_report
+    from hexapod_cosim.cosim.report.writing import ALL_FORMATS, write_report
     from hexapod_cosim.cosim.results.folder import read_result
 
     kind, reports = facts.get("kind"), report_functions()
@@ -70,13 +70,15 @@ def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     run = read_result(folder)
     control = run.facts.control
     accuracies = {control: run.accuracy} if run.accuracy else {}
-    return write_report({control: run}, folder, warn=warn, accuracies=accuracies)
+    return write_report(
+        {control: run}, folder, warn=warn, accuracies=accuracies, formats=ALL_FORMATS
+    )
 
 
 def _report_comparison(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     """Writes the report of a comparison's folder again; `facts` are those of its run.json."""
     from hexapod_cosim.cosim.common.files import PARTS
-    from hexapod_cosim.cosim.report.writing import write_report
+    from hexapod_cosim.cosim.report.writing import ALL_FORMATS, write_report
     from hexapod_cosim.cosim.results.folder import read_accuracies, read_result, read_scenario
     from hexapod_cosim.cosim.results.side_by_side import SEEDS, WALKS, compare_all, read_seeds
 
@@ -90,6 +92,7 @@ def _report_comparison(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
         command=facts["command"],
         walks=facts[WALKS],
         accuracies=read_accuracies(folder),
+        formats=ALL_FORMATS,
     )
 
 

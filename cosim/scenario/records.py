@@ -27,8 +27,11 @@ from hexapod_cosim.models.schema import Choice, Flag, Number, Text, Texts, Vecto
 CONTROLS = ("kinematic", "paper", "compliant")
 COMPARED = ("kinematic", "compliant")  # unless a command or a study names its controls
 FAULTS = ("dead", "stuck", "nan", "late")  # of sensors
+NOISY = "noisy"  # a further one of force sensors
 ANGLE, ATTITUDE = "angle", "attitude"  # sensors inside the robot
-SERVO_FAULTS = ("dead", "stuck")
+# of servos; dead and stuck are older names of limp and locked
+SERVO_FAULTS = ("weak", "limp", "locked", "dead", "stuck")
+WHOLE_LEG = "all"  # joints
 LOST = ("command", "step")
 DELAY = Number("s", at_least=0.0, at_most=1.0)  # of late readings
 FORMATS = ("parquet", "csv", "mcap")  # of recordings
@@ -81,13 +84,14 @@ class Fault:
 
     A dead sensor reads zero, a stuck one repeats its last reading, and nan is no number. A late one
     reads what it should have read `delay` earlier, rounded up to whole macro-steps, or else at the
-    start of the run.
+    start of the run. A noisy one has this noise: a standard deviation, as a share of the force.
     """
 
     time: Annotated[float, Number("s", at_least=0.0)]
     leg: Annotated[str, Choice(LEG_NAMES)]
-    fault: Annotated[str, Choice(FAULTS)]
+    fault: Annotated[str, Choice((*FAULTS, NOISY))]
     delay: Annotated[float, DELAY] = 0.0
+    noise: Annotated[float, Number("1", at_least=0.0)] = 0.1
     duration: Annotated[float, Number("s", above=0.0)] = math.inf
 
 
@@ -123,14 +127,15 @@ class AttitudeFault:
 class ServoFault:
     """A fault of a joint's servo from `time` [s from the start of the run].
 
-    A dead servo follows the joint: its command is the measured angle and speed, without torque. A
-    stuck one holds the angle that was measured when the fault began.
+    A weak servo gives a share of its largest torque, a limp one none; a locked joint stays at the
+    angle that it has when the fault begins (the plant's inputs `strength` and `lock`).
     """
 
     time: Annotated[float, Number("s", at_least=0.0)]
     leg: Annotated[str, Choice(LEG_NAMES)]
-    joint: Annotated[str, Choice(JOINT_NAMES)]
+    joint: Annotated[str, Choice((*JOINT_NAMES, WHOLE_LEG))]
     fault: Annotated[str, Choice(SERVO_FAULTS)]
+    share: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.5  # of a weak one
     duration: Annotated[float, Number("s", above=0.0)] = math.inf
 
 
@@ -311,13 +316,16 @@ SECTIONS = (
 KEYS = (*PLAIN_KEYS, "gravity", "events", *SECTIONS)
 
 
+UNUSED_SETTINGS = (("delay", 0.0), ("noise", 0.1), ("share", 0.5))
+
+
 def _as_table(record: Any) -> dict[str, Any]:
-    """Returns the fields of a record, without an infinite duration and a delay of 0, which files
-    omit.
+    """Returns the fields of a record, without an infinite duration and unused settings of faults,
+    which files omit.
     """
     table = {item.name: getattr(record, item.name) for item in fields(record)}
     return {
         key: value
         for key, value in table.items()
-        if value != math.inf and (key, value) != ("delay", 0.0)
+        if value != math.inf and (key, value) not in UNUSED_SETTINGS
     }

@@ -362,7 +362,7 @@ def test_a_single_run_and_one_that_recorded_little_have_pages_too(
 
 
 @pytest.mark.usefixtures("undrawn")
-@pytest.mark.parametrize(("name", "legend"), [("stairs", ""), ("sand", "Dry sand (LLL)")])
+@pytest.mark.parametrize(("name", "legend"), [("stairs", ""), ("sand", "soil")])
 def test_blocks_and_smooth_ground_with_soil_are_drawn(
     browser: Any, tmp_path: Path, name: str, legend: str
 ) -> None:
