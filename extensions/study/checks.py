@@ -8,7 +8,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, get_type_hints
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.controller.gains import PARTS
+from hexapod_cosim.controller.gains import SECTIONS
 from hexapod_cosim.cosim.interface.plant import Interface, load_interface
 from hexapod_cosim.cosim.scenario.controls import LAW
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table
@@ -120,7 +120,7 @@ def _check_gain(factor: Factor, study: Study, where: str) -> None:
     if factor.name not in gain_names():
         raise unknown_name("gain", factor.name, gain_names(), where=where, error=StudyError)
     part, _, name = factor.name.removeprefix(GAINS).partition(".")
-    allowed = specs(PARTS[part])[name]
+    allowed = specs(SECTIONS[part])[name]
     assert isinstance(allowed, Number)
     what, fix = "not a gain's value", "correct it, or leave the unit out"
     for value in samples(factor):
