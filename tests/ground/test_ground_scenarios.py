@@ -75,7 +75,10 @@ REFUSED = [
     (["terrain.kind=stairs", "terrain.step_height=3 deg"], "m or mm or cm"),
     (["terrain.kind=stairs", "terrain.patch=[{x=9, y=0, size=1, mu=0.1}]"], "leaves the map"),
     (["terrain.kind=plane", "terrain.patch=[{x=0, y=0, size=1, soil='mood'}]"], "soil"),
-    (["terrain.kind=heightfield", "terrain.file=nowhere.png"], "cannot read"),
+    (
+        ["terrain.kind=heightfield", "terrain.file=nowhere.png", "terrain.horizontal_scale=0.1"],
+        "cannot read",
+    ),
 ]
 
 
