@@ -18,9 +18,10 @@ from hexapod_cosim.controller.gains import (
 )
 from hexapod_cosim.controller.parts import COMPLIANT_PARTS, SWITCHES, Parts
 from hexapod_cosim.controller.signals import DEFAULT_PERIOD, Diagnostics, JointCommand, Measurement
+from hexapod_cosim.controller.walk.command import BodyCommand, CommandRamp
+from hexapod_cosim.controller.walk.foot_paths import FootPaths
 from hexapod_cosim.controller.walk.gait import PATTERNS, Gait, Pattern, make_gait
 from hexapod_cosim.controller.walk.kinematics import LegSolver
-from hexapod_cosim.controller.walk.trajectory import BodyCommand, CommandRamp, FootPaths
 
 __all__ = [
     "COMPLIANT_PARTS",

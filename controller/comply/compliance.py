@@ -16,28 +16,20 @@ the robot walks under kinematic control (C33).
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.support import Shares
+from hexapod_cosim.controller.comply.load_plan import LoadPlan
 from hexapod_cosim.controller.gains import TRIPOD_LEGS, Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, along, clamp, square
 from hexapod_cosim.controller.sense.burden import Burden
-from hexapod_cosim.controller.sense.contact_detection import ContactDetector, SensorWatch
-from hexapod_cosim.controller.sense.landing import Landings
-from hexapod_cosim.controller.sense.touchdown import EARLY, REACH_LIMIT, Touchdown
-from hexapod_cosim.controller.walk.inverse_dynamics import Demand
+from hexapod_cosim.controller.sense.contact_detection import ContactDetector
+from hexapod_cosim.controller.sense.touchdown import EARLY, REACH_LIMIT, Landings, Touchdown
+from hexapod_cosim.controller.sense.trust import SensorWatch, Trust
 
-SLIDING_DRAG = 0.55  # 1    common tangential over normal force beyond the plan: only a robot that
-# slides exceeds it, or one on a slope of 29 degrees
-CALM_CYCLES = 0.5  # 1    gait cycles without sliding until the feet are trusted again
-SLIDING_TIME = 0.04  # s    longer than a foot skids when it touches down
 SETTLED_SHARE = 0.5  # 1    of the weight: feet that carry less together have only just landed
-JOINTS_FOLLOW, JOINTS_DO_NOT = 0.35, 0.45  # 1    share of the time with too high joint speeds
-FEET_LATE = 0.2  # 1    the same, from which feet end their swings late whatever the ground
 GRIPPED = 0.99  # 1    of its share: a leg with more carries it
 LOAD_FLOOR = 1e-6  # N    a smaller sum of loads cannot be divided by
 LEAST_SCALE, LARGEST_SCALE = 0.5, 3.0  # 1    measured over modelled weight that is believed
@@ -46,29 +38,11 @@ LARGEST_LEAN = 0.4  # 1    of the depth of the ground: distance of the centre of
 HIGH_SHARE = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
 
 
-class Plan(NamedTuple):
-    """Planned loads and contacts of one step; (6,) in the walking frame unless stated otherwise."""
-
-    own: Array  # N m    (6, 3) torques for the legs' own weight and motion
-    carry: Array  # N m    (6, 3) torques for the planned load
-    shares: Shares
-    feet: Plane  # m    contact points, x + i y
-    weight: float  # N    scalar: of all shares
-    standing: Mask  # the leg carries its whole share
-    well_up: Mask  # well above the ground: in the air even if the ground is met early
-    height: Array  # m    of the paths over their ends
-    needed: float  # N m    scalar: the largest of `carry`
-    swinging: Mask  # planned in the air
-    awaited: Mask  # the gait clock waits for the foot
-    falling: Array  # m    by which feet well above the ground come down in a period
-    overspeed: bool  # scalar: the plan exceeds the speed limit of some joint
-
-
 class Compliance(Stateful):
     """Force laws of all feet.
 
     Attributes, (6,) unless stated otherwise:
-        detector, watch, touchdown, landings, burden: components with a state of their own.
+        detector, watch, touchdown, landings, burden, trust: components with a state of their own.
         load: smoothed load of the feet in thirds of the weight [1].
         torque: (6, 3) feed-forward torques of the servos [N m].
         doubted: sensors that are replaced by the plan.
@@ -79,17 +53,11 @@ class Compliance(Stateful):
         lean: horizontal distance of the measured centre of mass from the modelled one, walking
             frame, x + i y (scalar) [m].
         held: share of the planned squeeze that the ground holds, smoothed (scalar) [1].
-        trust: factor on all torques (scalar) [1].
-        lagging: the joints cannot follow the plan (scalar).
-        overspeed_share: share of the time in which the plan exceeds a speed limit (scalar) [1].
-        slide_periods: periods for which the robot has been sliding (scalar).
-        recovery_periods: periods that remain until feedback resumes after sliding (scalar).
     """
 
     STATE = (
-        "detector", "watch", "touchdown", "landings", "burden", "load", "torque", "doubted",
-        "fallback", "grip", "regaining", "scale", "lean", "held", "trust", "lagging",
-        "overspeed_share", "slide_periods", "recovery_periods",
+        "detector", "watch", "touchdown", "landings", "burden", "trust", "load", "torque",
+        "doubted", "fallback", "grip", "regaining", "scale", "lean", "held",
     )  # fmt: skip
 
     def __init__(
@@ -108,7 +76,7 @@ class Compliance(Stateful):
         weight: of the robot [N]; depth: of the ground below the torso's origin [m]; cycle,
         step_height: of its gait [s, m]; period [s].
         """
-        self.parts, self.period = parts, period
+        self.parts = parts
         self.share = weight / TRIPOD_LEGS  # N
         self.settled = SETTLED_SHARE * weight  # N
         self.most_lean = LARGEST_LEAN * depth  # m
@@ -119,80 +87,47 @@ class Compliance(Stateful):
         self.touchdown = Touchdown(period=period)
         time = gains.support.weight_time
         self.burden = Burden(most=gains.limits.torque, cycle=cycle, period=period, weight_time=time)
+        self.trust = Trust(cycle=cycle, period=period, load_time=gains.support.load_time)
         self.follow_load = 1.0 - math.exp(-period / gains.support.load_time)
         self.follow_cycle = 1.0 - math.exp(-period / cycle)
         self.follow_weight = 1.0 - math.exp(-period / gains.support.weight_time)
-        self.calm = round(CALM_CYCLES * cycle / period)  # periods
         self.most = gains.limits.torque  # N m
         self.reset()
 
     def reset(self) -> None:
         """Puts all laws to rest: no torques, all sensors trusted, no offsets."""
-        for part in (self.detector, self.watch, self.touchdown, self.landings, self.burden):
+        for part in (
+            self.detector, self.watch, self.touchdown, self.landings, self.burden, self.trust
+        ):  # fmt: skip
             part.reset()
         self.load, self.torque = np.zeros(LEGS), np.zeros((LEGS, 3))
         self.doubted, self.fallback = np.zeros((2, LEGS), dtype=np.bool_)
         self.grip, self.regaining = np.ones(LEGS), False
-        self.scale, self.lean, self.held, self.trust = 0.0, 0j, 1.0, 1.0
-        self.lagging, self.overspeed_share = False, 0.0
-        self.slide_periods, self.recovery_periods = 0, 0
+        self.scale, self.lean, self.held = 0.0, 0j, 1.0
 
     @property
     def touching(self) -> Mask:
         """Returns the feet (6,) on the ground; a doubted sensor is replaced by the plan."""
         return self.detector.touching
 
-    def plan(
-        self,
-        demand: Demand,
-        shares: Shares,
-        *,
-        feet: Plane,
-        height: Array,
-        rise: Array,
-        swinging: Mask,
-        awaited: Mask,
-        overspeed: bool = False,
-    ) -> Plan:
-        """Returns the plan of a step, from which the laws compute their corrections.
+    @property
+    def heft(self) -> float:
+        """Returns measured over modelled weight [1] (C32)."""
+        return self.burden.heft
 
-        Args:
-            demand: forces and torques that the planned motion needs.
-            shares: planned forces on the feet.
-            feet: (6,) contact points x + i y, walking frame [m].
-            height, rise: (6,) of the paths over the stance [m, m/s].
-            swinging: (6,) legs planned in the air.
-            awaited: (6,) feet that the gait clock waits for.
-            overspeed: the plan exceeds the speed limit of some joint.
-        """
-        supports = 1.0 if self.parts.support else 0.0
-        well_up = height > EARLY
-        carry = -supports * (demand.lever @ shares.forces()[:, :, None])[:, :, 0]
-        return Plan(
-            own=supports * demand.torque,
-            carry=carry,
-            shares=shares,
-            feet=feet,
-            weight=float(shares.normal.sum()),
-            standing=shares.activation >= 1.0,
-            well_up=well_up,
-            height=height,
-            needed=float(np.abs(carry).max()),
-            swinging=swinging,
-            awaited=awaited,
-            falling=np.where(well_up, np.maximum(-self.period * rise, 0.0), 0.0),
-            overspeed=overspeed,
-        )
+    def needed(self) -> float:
+        """Returns the torque needed for the measured weight over the torque allowed [1]."""
+        return self.burden.heft * self.burden.peak / self.burden.most
 
     # ------------------------------------------------------------------------------ contacts
 
-    def _replace_forces(self, plan: Plan, force: Array) -> Array:
+    def _replace_forces(self, plan: LoadPlan, force: Array) -> Array:
         """Returns the forces (6, 3) [N], with those of doubted sensors replaced by the plan."""
         planned = plan.shares.activation > 0.5
         self.detector.touching = np.where(self.doubted, planned, self.touching)
         return np.where(self.doubted[:, None], self.scale * plan.shares.forces(), force)
 
-    def _judge_sensors(self, plan: Plan, met: Array, force: Array) -> Array:
+    def _judge_sensors(self, plan: LoadPlan, met: Array, force: Array) -> Array:
         """Decides which sensors are doubted (C34): all of them once a tripod's are.
 
         met: (6,) heights at which the feet are expected to meet the ground [m]. Returns the forces
@@ -203,24 +138,24 @@ class Compliance(Stateful):
         due = plan.standing | plan.awaited
         doubted = self.watch.look(self.touching, total, due, high)
         self.doubted = doubted | (np.count_nonzero(doubted) >= TRIPOD_LEGS)
-        self.fallback = self.doubted | (self.trust < 1.0)
+        self.fallback = self.doubted | (self.trust.level < 1.0)
         return self._replace_forces(plan, force) if doubted.any() else force
 
     def _carries(self) -> Mask:
         """Returns the feet (6,) that carry so much that the gait clock need not wait for them."""
         return self.touching & (self.load > CARRYING)
 
-    def _meet_ground(self, plan: Plan, met: Array) -> None:
+    def _meet_ground(self, plan: LoadPlan, met: Array) -> None:
         """Adapts the foot heights to early and late contacts (C36). met: as in _judge_sensors()."""
         self.regaining = True
         early = self.landings.early(met, plan.height)
-        falling = np.where(early, plan.falling, 0.0)
+        falling = np.where(early, plan.descent, 0.0)
         searching = plan.awaited & ~self.doubted & ~self._carries()
         self.touchdown.step(
             self.touching, falling, plan.swinging, plan.standing, searching, self.doubted
         )
 
-    def _examine_contacts(self, plan: Plan, force: Array) -> Array:
+    def _examine_contacts(self, plan: LoadPlan, force: Array) -> Array:
         """Decides between a wrong sensor and an early or late contact.
 
         Returns the forces (6, 3) that the laws use [N].
@@ -228,42 +163,21 @@ class Compliance(Stateful):
         met = self.landings.expected(self.touching, plan.height, plan.swinging)
         if self.parts.fallback:
             force = self._judge_sensors(plan, met, force)
-        if self.trust < 1.0:
+        if self.trust.level < 1.0:
             self.touchdown.reset()
         elif self.parts.touchdown:
             self._meet_ground(plan, met)
         return force
 
-    def _contacts_differ(self, plan: Plan) -> bool:
+    def _contacts_differ(self, plan: LoadPlan) -> bool:
         """Returns whether contacts contradict the plan, or a response to it is still under way."""
-        certain = plan.standing | plan.well_up
+        certain = plan.standing | (plan.height > EARLY)
         differs = ((self.touching != plan.standing) & certain | plan.awaited).any()
         return bool(differs) or self.watch.busy() or self.touchdown.busy()
 
     # ------------------------------------------------------------------------ inputs and weight
 
-    def _update_trust(self, plan: Plan, drag: float) -> None:
-        """Updates the trust (C33), which falls while the planned load does not apply.
-
-        It does not apply to a robot that slides, whose joints cannot follow, or that is far too
-        heavy. drag: common tangential force of the feet above the plan, over the normal force [1].
-        """
-        self.overspeed_share += self.follow_cycle * (float(plan.overspeed) - self.overspeed_share)
-        self.lagging = self.overspeed_share > (JOINTS_FOLLOW if self.lagging else JOINTS_DO_NOT)
-        self.slide_periods = self.slide_periods + 1 if drag > SLIDING_DRAG else 0
-        if self.slide_periods * self.period > SLIDING_TIME:
-            self.recovery_periods = self.calm
-        elif self.recovery_periods:
-            self.recovery_periods -= 1
-        goal = 0.0 if self.recovery_periods or self.lagging or self.burden.overburdened else 1.0
-        if self.trust == goal:
-            return
-        self.trust += self.follow_load * (goal - self.trust)
-        if abs(goal - self.trust) < 1.0 - GRIPPED:
-            self.trust = goal
-        self.fallback = self.doubted | (goal == 0.0)
-
-    def _squeeze_lost(self, plan: Plan, deviation: Plane) -> float:
+    def _squeeze_lost(self, plan: LoadPlan, deviation: Plane) -> float:
         """Returns the share of the planned squeeze that creep has taken away, in [0, 1] (C46).
 
         deviation: (6,) of the tangential forces from the planned ones [N]. Without planned squeeze
@@ -275,7 +189,7 @@ class Compliance(Stateful):
             return 0.0
         return min(max(-float(along(planned, deviation).sum()) / whole, 0.0), 1.0)
 
-    def _feel(self, plan: Plan, force: Array) -> tuple[Array, float]:
+    def _feel(self, plan: LoadPlan, force: Array) -> tuple[Array, float]:
         """Returns the normal forces (6,) and their sum [N].
 
         It updates trust (C33), the smoothed loads (C27) and the share of the planned squeeze that
@@ -287,13 +201,16 @@ class Compliance(Stateful):
         total = float(normal.sum())
         if self.parts.fallback:
             drag = abs(deviation.sum()) / total if total > max(self.settled, LOAD_FLOOR) else 0.0
-            self._update_trust(plan, drag)
+            before, heavy = self.trust.level, self.burden.overburdened
+            goal = self.trust.step(drag, overspeed=plan.overspeed, overburdened=heavy)
+            if before != goal:
+                self.fallback = self.doubted | (goal == 0.0)
         self.load = self.load + self.follow_load * (normal / self.share - self.load)
         missing = self._squeeze_lost(plan, deviation)
         self.held += self.follow_cycle * (1.0 - missing - self.held)
         return normal, total
 
-    def _update_lean(self, plan: Plan, normal: Array, total: float) -> None:
+    def _update_lean(self, plan: LoadPlan, normal: Array, total: float) -> None:
         """Updates the distance of the centre of mass from the modelled one (C44).
 
         The planned loads contain the present distance. normal: (6,) measured [N]; total: their sum.
@@ -307,7 +224,7 @@ class Compliance(Stateful):
             min(max(lean.imag, -self.most_lean), self.most_lean),
         )
 
-    def _update_weight(self, plan: Plan, normal: Array, total: float) -> None:
+    def _update_weight(self, plan: LoadPlan, normal: Array, total: float) -> None:
         """Updates the ratio of measured to planned weight (C30), the centre of mass (C44) and the
         load of the servos.
 
@@ -323,7 +240,7 @@ class Compliance(Stateful):
 
     # ---------------------------------------------------------------------------------- joints
 
-    def _restore_grip(self, plan: Plan, torque: Array) -> Array:
+    def _restore_grip(self, plan: LoadPlan, torque: Array) -> Array:
         """Scales the planned load of each leg by its grip, which grows as the leg loads (C28).
 
         A leg that should stand and does not touch the ground has grip 0. torque: (6, 3) for the
@@ -334,13 +251,13 @@ class Compliance(Stateful):
         self.regaining = bool((self.grip < GRIPPED).any())
         return torque * self.grip[:, None]
 
-    def _actuate(self, plan: Plan) -> None:
+    def _actuate(self, plan: LoadPlan) -> None:
         """Sets the torques of the planned load: trust (own + grip strength scale carry) (C29)."""
         strength = self.burden.strength if self.parts.limits else 1.0
         torque = plan.carry * (strength * self.scale)
         if self.regaining:
             torque = self._restore_grip(plan, torque)
-        torque = (torque + plan.own) * self.trust
+        torque = (torque + plan.own) * self.trust.level
         self.torque = clamp(torque, -self.most, self.most) if self.parts.limits else torque
 
     def raised(self) -> tuple[Array, bool]:
@@ -352,7 +269,7 @@ class Compliance(Stateful):
 
         A sensor that is doubted is left out.
         """
-        if not self.parts.touchdown or self.trust < 1.0:
+        if not self.parts.touchdown or self.trust.level < 1.0:
             return np.zeros(LEGS, dtype=np.bool_)
         return self.touching & ~self.doubted
 
@@ -363,13 +280,13 @@ class Compliance(Stateful):
 
         landing: (6,) these legs; held: it waits already.
         """
-        if not self.parts.touchdown or self.trust < 1.0 or self.overspeed_share > FEET_LATE:
+        if not self.parts.touchdown or self.trust.level < 1.0 or self.trust.feet_late():
             return False
         found = self._carries() if held else self.touching
         hopeful = self.touchdown.offset > -REACH_LIMIT
         return bool((landing & ~found & ~self.doubted & hopeful).any())
 
-    def step(self, plan: Plan, force: Array) -> None:
+    def step(self, plan: LoadPlan, force: Array) -> None:
         """Advances all laws by one period.
 
         force: (6, 3) of the ground on the feet, walking frame [N].

@@ -19,22 +19,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.compliance import Compliance, Plan
+from hexapod_cosim.controller.comply.compliance import Compliance
+from hexapod_cosim.controller.comply.load_plan import LoadPlan, plan_load
 from hexapod_cosim.controller.comply.planned_squeeze import PlannedSqueeze
 from hexapod_cosim.controller.comply.posture import Posture
-from hexapod_cosim.controller.comply.support import Shares, Support
-from hexapod_cosim.controller.comply.sway import Sway
+from hexapod_cosim.controller.comply.support import Support
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
-from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis, clamp
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, cis, clamp
 from hexapod_cosim.controller.sense.load_adaptation import LoadAdaptation
 from hexapod_cosim.controller.signals import JointCommand, Measurement
 from hexapod_cosim.controller.walk.gait import Gait
+from hexapod_cosim.controller.walk.gait_clock import GaitClock
 from hexapod_cosim.controller.walk.hold import Hold, Sight
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.controller.walk.kinematics import LegSolver
-from hexapod_cosim.controller.walk.trajectory import Twist
+from hexapod_cosim.controller.walk.swing import Twist
 from hexapod_cosim.models import Robot
 
 STEERING_TIME = 0.1  # s    duration of the ramp from one added velocity to the next
@@ -55,15 +56,15 @@ def sense(measurement: Measurement, posture: Posture) -> Array:
     return force if posture.level else np.asarray(force @ posture.rotation.T)
 
 
-class Stance(NamedTuple):
+class PresentStep(NamedTuple):
     """Plan, command and geometry of the present step."""
 
-    plan: Plan  # of the laws
+    load: LoadPlan
     climb: Array  # rad/m    (6, 3) motion of the joints as a foot rises
     value: Array  # (6,) commanded vx vy yaw_rate height roll pitch
     posture: Posture  # of the torso
     plane: Plane  # m    (6,) planned feet, walking frame
-    sway: complex  # m    of the torso in the walking frame
+    torso: complex  # m    its way in the walking frame
     height: Array  # m    (6,) to which they are lowered, walking frame
     rolled: Array  # m    (6,) outwards from the stance to the positions that the feet aim at
 
@@ -90,7 +91,7 @@ class Compliant(Stateful):
         count: number of completed periods.
         offset: (6,) height offsets of early and late touch-downs at the last period [m].
         moving: the offsets have just changed.
-        stance: that of the last step; not part of the state.
+        present: the last step; not part of the state.
     """
 
     STATE = ("laws", "hold", "adaptation", "steering", "count", "offset", "moving")
@@ -105,10 +106,12 @@ class Compliant(Stateful):
         legs: LegSolver,
         period: float,
     ) -> None:
-        self.legs, self.per_second, self.leading = legs, 1.0 / period, STEERING_TIME / period
+        self.legs, self.period = legs, period
+        self.per_second, self.leading = 1.0 / period, STEERING_TIME / period
         self.dynamics = InverseDynamics(robot, legs, period=period)
-        self.sway = Sway(self.dynamics, legs, active=parts.sway)
-        self.support = Support(robot, gait, gains.support, rest=self.dynamics.rest())
+        self.support = Support(
+            robot, gait, gains.support, rest=self.dynamics.rest(), active=parts.support
+        )
         self.squeeze = PlannedSqueeze(
             friction=robot.friction.mu, weight=robot.weight, depth=-self.dynamics.floor
         )
@@ -129,7 +132,7 @@ class Compliant(Stateful):
             cycle=gait.period,
             period=period,
         )
-        self.stance: Stance
+        self.present: PresentStep
         self.reset()
 
     def reset(self) -> None:
@@ -140,11 +143,48 @@ class Compliant(Stateful):
         self.steering, self.count = NO_STEERING, 0
         self.offset, self.moving = np.zeros(LEGS), False
 
-    def shares(self, feet: Plane, activation: Array, demand: Demand) -> Shares:
-        """Returns the planned forces of feet (6,) x + i y, walking frame [m] (C19, C20, C42)."""
+    def plan(
+        self,
+        demand: Demand,
+        activation: Array,
+        *,
+        feet: Plane,
+        height: Array,
+        rise: Array,
+        swinging: Mask,
+        awaited: Mask,
+        overspeed: bool,
+    ) -> LoadPlan:
+        """Returns the planned loads of feet (6,) x + i y, walking frame [m] (C19, C20, C42).
+
+        activation: (6,) of the legs [1]; other arguments are those of plan_load().
+        """
         moment = demand.moment + demand.weight * self.laws.lean
         shares = self.support.shares(feet, activation, demand._replace(moment=moment))
-        return self.squeeze.add(feet, demand, shares, self.adaptation.squeeze)
+        return plan_load(
+            demand,
+            self.squeeze.add(feet, demand, shares, self.adaptation.squeeze),
+            active=self.support.active,
+            feet=feet,
+            height=height,
+            rise=rise,
+            swinging=swinging,
+            awaited=awaited,
+            overspeed=overspeed,
+            period=self.period,
+        )
+
+    def lowered(self, phase: Array, plane: Plane, clock: GaitClock) -> tuple[Array, Array]:
+        """Returns the activations of the legs (6,) and the lowering of their feet (6,) [m].
+
+        phase: (6,) of the legs [1]; plane: (6,) feet x + i y, walking frame [m]; clock: of the
+        gait, in the section of the step.
+        """
+        activation = self.support.activation(
+            phase, clock.stayed, clock.stays, walking=clock.walking
+        )
+        activation = np.where(clock.awaited, 0.0, activation)
+        return activation, self.support.lowering(plane, activation)
 
     # ------------------------------------------------------------------------------- steering
 
@@ -178,23 +218,23 @@ class Compliant(Stateful):
 
     # -------------------------------------------------------------------------------- sensors
 
-    def _look(self, measurement: Measurement, stance: Stance) -> None:
+    def _look(self, measurement: Measurement, present: PresentStep) -> None:
         """Passes feet, loads and attitude, as measured, to the slow loops."""
         legs, angle = self.legs, measurement.angle
         w, x, y, z = measurement.quaternion.tolist()
         foot = legs.forward(angle)
-        plane, height = stance.posture.turn(foot[:, 0] + 1j * foot[:, 1], foot[:, 2])
-        rolls = legs.rolling(angle) - stance.rolled
+        plane, height = present.posture.turn(foot[:, 0] + 1j * foot[:, 1], foot[:, 2])
+        rolls = legs.rolling(angle) - present.rolled
         rolled = cis(legs.hip_yaw + angle[:, 0]) * rolls
-        vx, vy, yaw_rate, commanded_height, roll, pitch = stance.value.tolist()
+        vx, vy, yaw_rate, commanded_height, roll, pitch = present.value.tolist()
         roll_seen = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
         pitch_seen = asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
         self.hold.look(
             Sight(
-                plane=plane - rolled + stance.sway,
+                plane=plane - rolled + present.torso,
                 height=height + commanded_height,
-                planned=stance.plane,
-                planned_height=stance.height,
+                planned=present.plane,
+                planned_height=present.height,
                 load=self.laws.load,
                 tilt=np.array([roll_seen - roll, pitch_seen - pitch]),
                 yaw=atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
@@ -213,26 +253,25 @@ class Compliant(Stateful):
         corrected = angle + climb * raised[:, None]
         return np.asarray(clamp(corrected, self.legs.angle_min, self.legs.angle_max))
 
-    def step(self, stance: Stance, measurement: Measurement, output: JointCommand) -> Array:
+    def step(self, present: PresentStep, measurement: Measurement, output: JointCommand) -> Array:
         """Advances compliant control by one period and corrects `output` in place (C41).
 
         Returns by how much the feet are raised (6,) [m].
         """
-        laws, self.stance = self.laws, stance
-        laws.step(stance.plan, sense(measurement, stance.posture))
+        laws, self.present = self.laws, present
+        laws.step(present.load, sense(measurement, present.posture))
         if self.count % self.hold.every == 0:
-            if laws.trust == 1.0:
-                self._look(measurement, stance)
+            if laws.trust.level == 1.0:
+                self._look(measurement, present)
             else:
                 self.hold.reset()
         self.count += 1
-        climb, (offset, busy) = stance.climb, laws.raised()
+        climb, (offset, busy) = present.climb, laws.raised()
         raised = offset + self.hold.lift
         output.angle_ref[...] = self._correct(output.angle_ref, climb, raised)
         output.torque_ref[...] = laws.torque
-        burden = laws.burden
-        self.adaptation.weigh(burden.heft)
-        self.adaptation.step(laws.torque, burden.heft * burden.peak / burden.most, laws.held)
+        self.adaptation.weigh(laws.heft)
+        self.adaptation.step(laws.torque, laws.needed(), laws.held)
         if busy or self.moving:
             rise = (offset - self.offset) * self.per_second
             output.speed_ref[...] += climb * rise[:, None]

@@ -9,39 +9,17 @@ under a load, so each foot is lowered by its indentation less that in the stance
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import numpy as np
 
+from hexapod_cosim.controller.comply.shares import LEAST_LOAD, Shares, indentation, solve
 from hexapod_cosim.controller.gains import SupportGains
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, across, clamp, rows_of, square
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, across, clamp, square
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand
 from hexapod_cosim.models import Robot
 
-RIDGE_SHARE = 1e-9  # 1    of the mean square arm: makes the system of feet on one line regular
-LEAST_ARM = 1e-12  # m2    makes the system without any standing foot regular
 LEAST_SPREAD = 1e-4  # m2    mean square distance of the feet from their centre: below it no twist
-LEAST_LOAD = 1e-6  # N    floor of the sum of loads that the shares are divided by
 ONES = np.ones(LEGS)
-
-
-class Shares(NamedTuple):
-    """Planned forces of the ground on the feet, walking frame, (6,) each."""
-
-    activation: Array  # 1    in [0, 1]
-    normal: Array  # N    vertical, never negative
-    push: Plane  # N    horizontal, x + i y
-    squeeze: Plane  # N    the part of `push` by which the legs squeeze each other (C42)
-
-    def forces(self) -> Array:
-        """Returns the forces (6, 3) [N]."""
-        return rows_of(self.push.real, self.push.imag, self.normal)
-
-
-def indentation(load: Any, stiffness: float) -> Any:
-    """Returns the indentation [m] of the ground under loads [N], (f_n/K)^(2/3) (C21)."""
-    return np.cbrt(load / stiffness) ** 2
 
 
 def _smooth(x: Array) -> Array:
@@ -50,31 +28,24 @@ def _smooth(x: Array) -> Array:
     return np.asarray(x * x * x * (10.0 + x * (6.0 * x - 15.0)))
 
 
-def solve(system: Array, needed: tuple[float, float, float]) -> Array:
-    """Solves S x = b for x (3,), S (3, 3) symmetric and positive semidefinite, by S = L D L^T.
-
-    A ridge on the diagonal makes S definite.
-    """
-    (s00, s01, s02), (_, s11, s12), (_, _, s22) = system.tolist()
-    ridge = RIDGE_SHARE * (s00 + s11 + s22) + LEAST_ARM
-    d0, s11, s22 = s00 + ridge, s11 + ridge, s22 + ridge
-    b0, b1, b2 = needed
-    l10, l20 = s01 / d0, s02 / d0
-    d1 = s11 - l10 * s01
-    l21 = (s12 - l20 * s01) / d1
-    d2 = s22 - l20 * s02 - l21 * l21 * d1
-    y1 = b1 - l10 * b0
-    y2 = b2 - l20 * b0 - l21 * y1
-    x2 = y2 / d2
-    x1 = y1 / d1 - l21 * x2
-    return np.array([b0 / d0 - l10 * x1 - l20 * x2, x1, x2])
-
-
 class Support:
     """Computes activations and load shares for one gait of one robot."""
 
-    def __init__(self, robot: Robot, gait: Gait, gains: SupportGains, *, rest: Demand) -> None:
-        """Computes the constants of gait and ground; rest: the demand of the standing robot."""
+    def __init__(
+        self,
+        robot: Robot,
+        gait: Gait,
+        gains: SupportGains,
+        *,
+        rest: Demand,
+        active: bool = True,
+    ) -> None:
+        """Computes the constants of gait and ground.
+
+        rest: the demand of the standing robot; active: the part is on; otherwise no foot is lowered
+        and no servo carries the load.
+        """
+        self.active = active
         self.duty, self.stiffness, self.rest = gait.duty, robot.contact.stiffness, rest
         # limited, so that the two changes of a leg's load do not overlap in any gait
         self.handover = min(gains.handover_time / gait.period, gait.duty, 1.0 - gait.duty)  # cycles
@@ -115,6 +86,8 @@ class Support:
 
         Arguments are those of share_normal().
         """
+        if not self.active:
+            return np.zeros(LEGS)
         normal = self.share_normal(feet, activation, self.rest.weight, self.rest.moment)
         return np.asarray(indentation(normal, self.stiffness) - self.rest_depth)
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from hexapod_cosim.controller import BodyCommand, Controller, Gait
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.plane import LEGS, cis
-from hexapod_cosim.controller.walk.trajectory import Twist, travel
+from hexapod_cosim.controller.planned_step import place_legs
+from hexapod_cosim.controller.walk.swing import Twist, travel
 from hexapod_cosim.cosim.scenario.records import Command
 from hexapod_cosim.models import Robot, ScenarioError
 
@@ -62,8 +63,8 @@ def _walks(values: Array, robot: Robot, gait: Gait) -> bool:
     least = min(gait.duty, 1.0 - gait.duty)
     count = max(STEPS_PER_CYCLE, math.ceil(min(4.0 / least, MOST_STEPS)))
     controller = Controller(robot, period=gait.period / count, gait=gait)
-    paths = controller.paths
-    clock = paths.offset + np.arange(count)[:, None] / count  # cycles    (count, 6)
+    paths = controller.plan.paths
+    clock = paths.clock.offset + np.arange(count)[:, None] / count  # cycles    (count, 6)
     phase = clock - np.floor(clock)
     time = gait.period * (phase - 0.5 * gait.duty)  # s    since half-way
     vx, vy, yaw_rate = values[:3].tolist()
@@ -71,7 +72,7 @@ def _walks(values: Array, robot: Robot, gait: Gait) -> bool:
     plane = cis(-yaw_rate * time) * (paths.home - way)
     height = np.broadcast_to(paths.home_height, plane.shape)
     posture = Posture.of(values[3:], np.zeros(3))
-    _, pose = controller.place_legs(posture, plane, height, np.zeros(LEGS))
+    _, pose = place_legs(controller.legs, posture, plane, height, np.zeros(LEGS))
     still = np.zeros_like(plane)
     unreachable = controller.legs.solve(pose, still, still.real).unreachable
     return not (unreachable & (phase < gait.duty)).any()

@@ -198,7 +198,7 @@ def test_a_robot_that_outruns_its_joints_goes_over_to_kinematic_control() -> Non
             for k in range(100):
                 plan(laws, overspeed=k % 10 < round(10 * share))
                 laws.feel(force)
-            assert cycle < 6 or laws.lagging is lagging
+            assert cycle < 6 or laws.trust.lagging is lagging
         assert bool(laws.fallback.all()) is lagging
 
 
@@ -229,7 +229,7 @@ def test_the_forces_on_a_torso_that_leans_as_commanded_are_judged_upright() -> N
     compliant = controller.compliant
     assert compliant is not None
     np.testing.assert_allclose(
-        sense(measurement, compliant.stance.posture), measurement.foot_force, atol=1e-12
+        sense(measurement, compliant.present.posture), measurement.foot_force, atol=1e-12
     )
 
 

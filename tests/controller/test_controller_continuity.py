@@ -59,9 +59,9 @@ def torques(name: str, gait: str, period: float) -> np.ndarray:
             k * period, BodyCommand(vx=0.04, yaw_rate=0.05) if walks else BodyCommand(), measurement
         )
         found.append(out.torque_ref.copy())
-        measurement.foot_force[:] = compliant.stance.plan.shares.forces()
+        measurement.foot_force[:] = compliant.present.load.shares.forces()
         measurement.angle[:] = out.angle_ref
-    assert not controller.paths.walking
+    assert not controller.plan.paths.clock.walking
     return np.array(found)
 
 
@@ -153,7 +153,7 @@ def test_a_change_of_gait_takes_a_swing_and_the_feet_then_step_in_the_new_gait()
         count += 1
     # the legs that lifted off at step 400 or 401 land half a second later
     assert 500 <= count <= 503
-    assert controller.paths.walking
+    assert controller.plan.paths.clock.walking
     swinging = []
     for k in range(count, count + 600):
         walk(controller, range(k, k + 1))

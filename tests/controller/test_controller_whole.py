@@ -57,7 +57,7 @@ def test_a_walk_starts_and_ends_in_the_stance_without_jumps(name: str, gait: str
     angle = np.concatenate([walk, stop])[:, 0]
     np.testing.assert_allclose(angle[-1], robot.stance, atol=ROUND_OFF)
     np.testing.assert_allclose(angle[-1], angle[-200], atol=0.0)
-    assert not controller.paths.walking
+    assert not controller.plan.paths.clock.walking
     assert np.abs(np.diff(angle, axis=0)).max() < robot.servo.speed_max * PERIOD * 1.3
     assert (
         np.abs(np.diff(angle, 2, axis=0)).max() < 200.0 * PERIOD**2

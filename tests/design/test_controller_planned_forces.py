@@ -13,7 +13,7 @@ from states import changed, with_links
 from twin_motion import Motion, Z, twin_needs
 
 from hexapod_cosim.controller import BodyCommand, Controller, Gait, Measurement, Parts, make_gait
-from hexapod_cosim.controller.comply.compliance import Plan
+from hexapod_cosim.controller.comply.load_plan import LoadPlan
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.actuator import GEAR_SPEED
 from hexapod_cosim.models.dynamics import mass_matrix
@@ -46,7 +46,7 @@ class Step(NamedTuple):
     middle.
     """
 
-    plan: Plan
+    plan: LoadPlan
     motion: Motion
 
 
@@ -59,7 +59,7 @@ def walker(robot: Robot, gait: Gait) -> Controller:
 
 def present(controller: Controller) -> Step | None:
     """The present step; None where a section of the walk begins or ends."""
-    before, now, after = controller._before, controller._now, controller._after
+    before, now, after = controller.plan.before, controller.plan.now, controller.plan.after
     if before is None or after is None:
         return None
     compliant, steps = controller.compliant, (before, now, after)
@@ -73,7 +73,7 @@ def present(controller: Controller) -> Step | None:
         np.array([step.pose.angle for step in steps]),
     )
     speed = np.array([np.full((6, 3), np.nan), controller._out.speed_ref, np.full((6, 3), np.nan)])
-    return Step(compliant.stance.plan, Motion(PERIOD, way, yaw, posture, angle, speed))
+    return Step(compliant.present.load, Motion(PERIOD, way, yaw, posture, angle, speed))
 
 
 def planned(robot: Robot, command: BodyCommand, gait: Gait | None = None) -> list[Step]:
@@ -83,13 +83,13 @@ def planned(robot: Robot, command: BodyCommand, gait: Gait | None = None) -> lis
         0,
         list[Step](),
     )
-    while steps < BEGUN or not found or controller._after is not None:
+    while steps < BEGUN or not found or controller.plan.after is not None:
         controller.step(steps * PERIOD, command, Measurement())
         steps += 1
         if steps < BEGUN:
             continue
         step = present(controller)
-        if step is not None and (found or controller._at == 2):
+        if step is not None and (found or controller.plan.at == 2):
             found.append(step)
     return found
 

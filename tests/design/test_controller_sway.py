@@ -66,7 +66,7 @@ def pushes(controller: Controller, steps: int) -> np.ndarray:
     dynamics = controller.compliant.dynamics
     for step in range(steps):
         out = controller.step(step * PERIOD, BodyCommand(vx=0.06), measurement)
-        before, now, after = controller._before, controller._now, controller._after
+        before, now, after = controller.plan.before, controller.plan.now, controller.plan.after
         if before is not None and after is not None:
             three = (before, now, after)
             masses, poses = tuple(x.masses for x in three), tuple(x.pose for x in three)
@@ -87,7 +87,7 @@ def test_the_centre_of_mass_stays_when_feet_move_and_a_torso_with_a_payload_sway
     dynamics = InverseDynamics(robot, legs, period=PERIOD)
     payload = (heft - 1.0) * dynamics.total_mass  # kg
     controller = walk(name, sway=True)
-    sway, feet = Sway(dynamics, legs, active=True), controller._now.feet
+    sway, feet = Sway(dynamics, legs, active=True), controller.plan.now.feet
     x, y, z = dynamics.stance.T
     home, level = x + 1j * y, Posture.of(np.zeros(3), np.zeros(3))
 
@@ -97,11 +97,10 @@ def test_the_centre_of_mass_stays_when_feet_move_and_a_torso_with_a_payload_sway
         links = (dynamics.mass * masses.ground).sum()
         return complex(links + (dynamics.torso_mass + payload) * masses.torso_ground)
 
-    adaptation = Weighed(heft, 1.0)
-    guess = sway.guess(feet._replace(plane=home + step), adaptation)
+    guess = sway.guess(feet._replace(plane=home + step), heft)
     placed = dynamics.place(legs.pose(home + step - guess, z), guess, 0.0, level)
     without = moment(home + step, 0j) - moment(home, 0j)
-    for moved, most in ((guess, 5e-3), (sway.of(guess, placed, adaptation), 1e-4)):
+    for moved, most in ((guess, 5e-3), (sway.of(guess, placed, heft), 1e-4)):
         left = moment(home + step, moved) - moment(home, 0j)
         assert abs(left) < most * abs(without)
 
@@ -119,11 +118,11 @@ def test_a_standing_foot_keeps_its_place_on_the_ground(sway: bool) -> None:
     last, ways = None, []
     for step in range(900):
         controller.step(step * PERIOD, BodyCommand(vx=0.06, yaw_rate=0.1), measurement)
-        now = controller._now
-        ways.append(abs(now.sway))
+        now = controller.plan.now
+        ways.append(abs(now.torso))
         turn = np.exp(1j * now.feet.turn)
-        ground = now.feet.way + turn * (now.sway + now.plane)
-        stands = controller.paths.standing & (controller._at > 0)
+        ground = now.feet.way + turn * (now.torso + now.plane)
+        stands = controller.plan.paths.clock.standing & (controller.plan.at > 0)
         if last is not None:
             assert np.abs(np.where(stands, ground - last, 0.0)).max() < ROUND_OFF
         last = ground
@@ -140,7 +139,7 @@ def test_the_torso_does_not_sway_without_payload_or_part_and_under_other_control
     ):
         for step in range(300):
             controller.step(step * PERIOD, BodyCommand(vx=0.06), Measurement())
-            assert controller._now.sway == 0.0
+            assert controller.plan.now.torso == 0.0
 
 
 # Tests the measured centre of mass: the load plan moves to where the load is.

@@ -78,7 +78,7 @@ class Ground:
         compliant, draw = controller.compliant, self.generator.normal
         if compliant is None:
             return
-        planned = compliant.stance.plan.shares.forces()
+        planned = compliant.present.load.shares.forces()
         measurement.foot_force[:] = planned * (
             1.0 + self.noise * draw(size=(6, 1))
         ) + 3.0 * self.noise * draw(size=(6, 3)) * (planned > 0.0)

@@ -100,7 +100,7 @@ def test_ground_that_is_met_early_is_answered_at_the_same_step(
             np.where(np.arange(6) == 2, bump, 0.012 if parts is ALL_PARTS else 0.0),
         )
         assert compliant is not None
-        height = compliant.stance.plan.height
+        height = compliant.present.load.height
         if step < 1200:
             measurement.foot_force[(height > 0.0) & (height < met), 2] = 4.0
 
@@ -124,11 +124,12 @@ class LowGround:
         self.ground(controller, step, measurement)
         compliant = controller.compliant
         assert compliant is not None
-        lowered, awaited = compliant.laws.touchdown.offset, controller.paths.awaited
+        lowered, awaited = compliant.laws.touchdown.offset, controller.plan.paths.clock.awaited
         measurement.foot_force[:, 2] += 12.0 * (awaited & (lowered < -0.012))
-        measurement.foot_force[2] *= not (controller.paths.swinging[2] and lowered[2] > -0.012)
+        swings = controller.plan.paths.clock.swinging[2]
+        measurement.foot_force[2] *= not (swings and lowered[2] > -0.012)
         measurement.foot_force[3] *= step % 700 < 500
-        self.held.append(controller.paths.held)
+        self.held.append(controller.plan.paths.clock.held)
 
 
 @pytest.mark.parametrize("gait", ["ripple", "amble"])

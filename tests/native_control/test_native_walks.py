@@ -127,8 +127,8 @@ def test_steps_of_a_robot_that_is_heavier_than_told_are_the_same(
     def heavy(controller: Controller, step: int, measurement: Measurement) -> None:
         ground(controller, step, measurement)
         measurement.foot_force[:] *= 1.4
-        narrowing.append(controller.paths.narrowing)
-        sway.append(abs(controller._now.sway))
+        narrowing.append(controller.plan.paths.narrowing)
+        sway.append(abs(controller.plan.now.torso))
 
     setup = setup_of(gait=gait)
     assert close(differences(controller_core, setup, sense=heavy, steps=steps)[0])

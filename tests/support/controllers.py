@@ -68,6 +68,6 @@ def obey(controller: Controller, command: BodyCommand, steps: int) -> np.ndarray
         out = controller.step(k * PERIOD, command, measurement)
         found.append(np.stack([out.angle_ref, out.speed_ref, out.torque_ref]))
         if compliant is not None:
-            measurement.foot_force[:] = compliant.stance.plan.shares.forces()
+            measurement.foot_force[:] = compliant.present.load.shares.forces()
             measurement.angle[:] = out.angle_ref
     return np.array(found)

@@ -8,7 +8,8 @@ import numpy as np
 from gains import PERIOD, make_gains, weight
 
 from hexapod_cosim.controller import Gains, LegSolver, Parts, make_gait
-from hexapod_cosim.controller.comply.compliance import Compliance, Plan
+from hexapod_cosim.controller.comply.compliance import Compliance
+from hexapod_cosim.controller.comply.load_plan import LoadPlan, plan_load
 from hexapod_cosim.controller.comply.support import Support
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.models import Robot, load_robot
@@ -30,7 +31,7 @@ def rest(robot: Robot) -> Demand:
 class Laws(Compliance):
     """The laws, and what the present step requires of them."""
 
-    planned: Plan
+    planned: LoadPlan
 
     def feel(self, force: np.ndarray) -> None:
         """Advances the laws by one period under forces (6, 3) on the feet."""
@@ -70,15 +71,17 @@ def plan(
     home = LegSolver(robot).forward(robot.stance)[:, :2] @ np.array([1.0, 1.0j])
     support = Support(robot, make_gait(robot), make_gains(robot).support, rest=still)
     shares, air = support.shares(home, stands.astype(float), still), 1.0 - stands
-    laws.planned = laws.plan(
+    laws.planned = plan_load(
         still,
         shares,
+        active=laws.parts.support,
         feet=home,
         height=height * air,
         rise=rise * air,
         swinging=~stands,
         awaited=np.zeros(6, dtype=np.bool_),
         overspeed=overspeed,
+        period=PERIOD,
     )
 
 

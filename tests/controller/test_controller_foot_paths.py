@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.controller import BodyCommand, CommandRamp, FootPaths, LegSolver, make_gait
-from hexapod_cosim.controller.walk.trajectory import PlannedFeet, Twist, blend
+from hexapod_cosim.controller.walk.foot_paths import PlannedFeet
+from hexapod_cosim.controller.walk.swing import Twist, blend
 from hexapod_cosim.models import GAITS, HexapodError, load_robot
 
 PERIOD = 1e-3  # s
@@ -39,7 +40,7 @@ class Walk:
 
     def step(self, twist: Twist, *, going: bool = True, afresh: bool = False) -> None:
         """Advances by one period; a new section begins where the last one ends, or afresh."""
-        if afresh or self.at == 0 or not self.paths.reach(self.at + 1):
+        if afresh or self.at == 0 or not self.paths.clock.reach(self.at + 1):
             self.feet, self.at = self.paths.plan(self.feet, self.at, going=going, twist=twist), 0
         self.at += 1
         self.feet = self.paths.walk(self.at, twist, self.feet)
@@ -50,7 +51,7 @@ class Walk:
         the others.
         """
         tau = (self.feet.phase - self.gait.duty) / (1.0 - self.gait.duty)
-        return np.where(self.paths.swinging, tau, 0.0)
+        return np.where(self.paths.clock.swinging, tau, 0.0)
 
 
 def advance(walk: Walk, twist: Twist, steps: int, *, going: bool = True) -> Iterator[Walk]:
@@ -63,7 +64,7 @@ def advance(walk: Walk, twist: Twist, steps: int, *, going: bool = True) -> Iter
 def record(steps: Iterable[Walk]) -> dict[str, np.ndarray]:
     """Records the feet of each step, `swinging` and `progress`."""
     rows = [
-        {**walk.feet._asdict(), "swinging": walk.paths.swinging, "progress": walk.progress}
+        {**walk.feet._asdict(), "swinging": walk.paths.clock.swinging, "progress": walk.progress}
         for walk in steps
     ]
     return {
@@ -225,16 +226,16 @@ def test_while_the_clock_is_held_no_foot_moves_over_the_ground_and_then_it_conti
     paths = FootPaths(make_gait(robot), LegSolver(robot).forward(robot.stance), period=0.005)
     twist = Twist(0.05 + 0.01j, 0.1)
     feet, number = paths.plan(paths.reset(), 0, going=True, twist=twist), 0
-    while paths.reach(number + 1):
+    while paths.clock.reach(number + 1):
         number += 1
         feet = paths.walk(number, twist, feet)
-    landing = paths.landing(number)
+    landing = paths.clock.landing(number)
     assert landing.sum() == 3
     feet = paths.hold(feet, number, twist=twist)
     ground, phase = paths._ground_of(feet), feet.phase
     for k in range(1, 41):
-        assert paths.reach(k)
-        np.testing.assert_array_equal(paths.landing(k), landing)
+        assert paths.clock.reach(k)
+        np.testing.assert_array_equal(paths.clock.landing(k), landing)
         before, feet = feet, paths.walk(k, twist, feet)
         np.testing.assert_allclose(paths._ground_of(feet), ground, atol=1e-15)
         np.testing.assert_array_equal(feet.phase, phase)
@@ -242,8 +243,8 @@ def test_while_the_clock_is_held_no_foot_moves_over_the_ground_and_then_it_conti
         np.testing.assert_allclose((feet.plane - before.plane) / 0.005, feet.velocity, atol=1e-4)
     feet = paths.plan(feet, 40, going=True, twist=twist)
     np.testing.assert_array_equal(feet.phase, phase)
-    assert not (paths.swinging & landing).any()
-    assert not paths.awaited.any()
+    assert not (paths.clock.swinging & landing).any()
+    assert not paths.clock.awaited.any()
 
 
 def test_a_foot_that_has_met_the_ground_stays_there() -> None:
@@ -253,7 +254,7 @@ def test_a_foot_that_has_met_the_ground_stays_there() -> None:
     feet = paths.plan(paths.reset(), 0, going=True, twist=twist)
     for number in range(1, 71):
         feet = paths.walk(number, twist, feet)
-    leg = int(np.flatnonzero(paths.swinging)[0])
+    leg = int(np.flatnonzero(paths.clock.swinging)[0])
     paths.met = np.arange(6) == leg
     place = paths._ground_of(feet)[leg]
     for number in range(71, 91):

@@ -1,0 +1,237 @@
+"""Plans the steps of a walk: three of them, before, at and after the present one. C: plan.h.
+
+    command -> ramp -> foot paths -> rolling -> posture -> inverse kinematics
+
+Speeds, forces and accelerations are differences of successive steps. So every period the step after
+the present one is planned, and three steps are kept. When a leg lifts off or touches down, a new
+section of the walk begins; no difference reaches across the boundary of two sections.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from hexapod_cosim.controller.comply.compliant import Compliant
+from hexapod_cosim.controller.comply.posture import Posture
+from hexapod_cosim.controller.memory import Stateful
+from hexapod_cosim.controller.parts import Parts
+from hexapod_cosim.controller.plane import LEGS, Array, cis, rows_of
+from hexapod_cosim.controller.planned_step import PlannedStep, StepPlanner
+from hexapod_cosim.controller.walk.command import CommandRamp
+from hexapod_cosim.controller.walk.foot_paths import FootPaths
+from hexapod_cosim.controller.walk.gait import Gait
+from hexapod_cosim.controller.walk.gait_clock import NO_LEG
+from hexapod_cosim.controller.walk.inverse_dynamics import Neighbours
+from hexapod_cosim.controller.walk.kinematics import Feet, LegSolver, Pose
+from hexapod_cosim.controller.walk.swing import Twist
+
+
+class WalkPlan(Stateful):
+    """The planned steps of one robot in one gait.
+
+    Attributes:
+        ramp: of the command.
+        paths: of the feet.
+        at: the present step, counted from the begin of its section.
+        last: the step at which the ramp ends, where a new section begins.
+        cut: the present step is the last of its section.
+        before, now, after: the step before the present one, this one and the next one. None: there
+            is none in the section.
+        laws: compliant control, on which the plan depends; None: none.
+    """
+
+    STATE = ("ramp", "paths", "at", "last", "cut", "before", "now", "after")
+
+    def __init__(
+        self, gait: Gait, parts: Parts, *, legs: LegSolver, period: float, laws: Compliant | None
+    ) -> None:
+        """Plans to stand. Constants depend on the gait; period: of the controller [s]."""
+        self.legs, self.period, self.laws = legs, period, laws
+        self.ramp = CommandRamp(gait.period, period=period)
+        home = legs.forward(legs.stance)
+        inward = -gait.narrowing * cis(legs.hip_yaw + legs.stance[:, 0])
+        narrow = legs.pose(home[:, 0] + 1j * home[:, 1] + inward, home[:, 2])
+        turned = legs.rolling(narrow.angle)
+        self.paths = FootPaths(gait, home, period=period, inward=inward, turned=turned)
+        if laws is not None:
+            self.paths.clock.handover = laws.support.handover
+        self.planner = StepPlanner(parts, legs=legs, laws=laws)
+        self.now: PlannedStep
+        self.reset()
+
+    def reset(self) -> None:
+        """Plans to stand in the stance."""
+        self.ramp.reset()
+        self.at, self.last, self.cut = 0, math.inf, True
+        self.before: PlannedStep | None = None
+        self.after: PlannedStep | None = None
+        feet = self.paths.reset()
+        value, posture, _ = self._look_ahead(0, 0)
+        self.now = self.planner.lay_out(value, posture, feet, self.paths.clock)
+
+    # ---------------------------------------------------------------------------------- a step
+
+    def _look_ahead(self, ahead: int, number: int) -> tuple[Array, Posture, Twist]:
+        """Returns command value, posture and body motion `ahead` periods after the present step.
+
+        number: periods since the section began, on which the addition of the slow loops depends.
+        """
+        value, rate = self.ramp.ahead(ahead)
+        vx, vy, yaw_rate = value[:3].tolist()
+        twist = Twist(complex(vx, vy), yaw_rate)
+        if self.laws is not None:
+            added = self.laws.addition(number)
+            twist = Twist(twist.velocity + added.velocity, twist.yaw_rate + added.yaw_rate)
+        return value, Posture.of(value[3:], rate[3:]), twist
+
+    def _plan_step(self, number: int, before: PlannedStep) -> PlannedStep:
+        """Plans the step `number` periods after the section began; before: the step before it."""
+        value, posture, twist = self._look_ahead(1, number)
+        feet = self.paths.walk(number, twist, before.feet)
+        return self.planner.lay_out(value, posture, feet, self.paths.clock)
+
+    # --------------------------------------------------------------------------------- sections
+
+    def _follow_sensors(self, laws: Compliant) -> None:
+        """Notes which feet have met the ground on their way down (C51), and narrows the stance.
+
+        The steps of a commanded motion aim at the stance that the weight asks for (C53).
+        """
+        paths = self.paths
+        paths.met = paths.clock.swinging & (self.now.feet.rise < 0.0) & laws.laws.meets()
+        if self.ramp.moves():
+            paths.narrowing = laws.adaptation.narrowing
+
+    def _waits(self) -> bool:
+        """Returns whether the gait clock waits for feet at the ends of their swings (C50)."""
+        clock = self.paths.clock
+        return self.laws is not None and self.laws.laws.waits(
+            clock.landing(self.at), held=clock.held
+        )
+
+    def _plan_afresh(self, *, waiting: bool) -> None:
+        """Begins a new section at the present step, and plans the step after it.
+
+        waiting: the gait clock stands still in it.
+        """
+        moves, settled = self.ramp.moves(), self.ramp.settled()
+        if self.laws is not None:
+            self.laws.steer(self.at, moves=moves, afresh=self.cut)
+        value, posture, twist = self._look_ahead(0, 0)
+        going = moves or not settled
+        if waiting:
+            feet = self.paths.hold(self.now.feet, self.at, twist=twist)
+        else:
+            feet = self.paths.plan(self.now.feet, self.at, going=going, twist=twist)
+        self.now = self.planner.lay_out(value, posture, feet, self.paths.clock)
+        self.last = math.inf if moves or settled else self.ramp.end - self.ramp.steps
+        self.at = 0
+        self.after = self._plan_step(1, self.now)
+
+    def advance(self, command_changed: bool) -> None:
+        """Makes the planned step the present one, and plans the step after it.
+
+        command_changed: the plan no longer applies, and a new section begins.
+        """
+        due, clock = command_changed or self.after is None, self.paths.clock
+        if self.laws is not None:
+            self._follow_sensors(self.laws)
+        if due or clock.held:
+            waiting = self._waits()
+            if due or not waiting:
+                self._plan_afresh(waiting=waiting)
+        assert self.after is not None
+        self.before, self.now, self.after = self.now, self.after, None
+        self.at += 1
+        self.ramp.steps += 1
+        number = self.at + 1
+        reached, planned = clock.reach(number), number <= self.last
+        self.cut = planned and not reached
+        if reached and planned:
+            self.after = self._plan_step(number, self.now)
+
+    # -------------------------------------------------------------- change of gait and control
+
+    def end(self) -> None:
+        """Lets the legs finish their steps and begin no other (C55)."""
+        self.after = None
+        self.paths.clock.ending = self.paths.clock.walking
+
+    def ended(self) -> bool:
+        """Returns whether all legs stand and carry their whole loads."""
+        clock = self.paths.clock
+        full = bool((self.now.activation >= 1.0).all())
+        return not clock.walking or (clock.ended() and full)
+
+    def adopt(self, before: WalkPlan) -> None:
+        """Begins with the standing feet and the command of the plan of another gait (C55)."""
+        clock = self.paths.clock
+        offset, late = clock.offset, clock.late
+        self.restore(before.save())
+        self.ramp.carry(before.ramp)
+        clock.offset, clock.late = offset, late
+        self.now = self.now._replace(feet=self.paths.join(self.now.feet))
+        self.after, self.at, self.last, self.cut = None, 0, math.inf, True
+
+    def carry(self, before: WalkPlan) -> None:
+        """Goes on in the phase of the plan under another control, in the same gait."""
+        self.restore(before.save())
+        self.paths.met = NO_LEG
+        if self.laws is None:
+            self.paths.narrowing = 0.0
+        self.after, self.cut = None, True
+
+    # ------------------------------------------------------------------------- the present step
+
+    def _rate_of(self, name: str) -> Any:
+        """Returns the rate of a quantity per second by differences, one-sided at section ends."""
+        if self.before is None:
+            return np.zeros(LEGS)
+        before = getattr(self.before, name)
+        if self.after is None:
+            return (getattr(self.now, name) - before) / self.period
+        return (getattr(self.after, name) - before) / (2.0 * self.period)
+
+    def centres(self) -> Array:
+        """Returns the planned centres of the feet (6, 3), torso frame [m].
+
+        They are those of the paths with the shift due to rolling, without the lowering.
+        """
+        now = self.now
+        plane, height = now.posture.see_place(now.plane + now.shift, now.feet.height)
+        return rows_of(plane.real, plane.imag, height)
+
+    def feet(self) -> Feet:
+        """Returns the feet of the present step with rolling and lowering, torso frame."""
+        now = self.now
+        return now.posture.see(
+            Feet(
+                plane=now.plane + now.shift,
+                height=now.height,
+                velocity=now.feet.velocity - self._rate_of("torso") + self._rate_of("shift"),
+                rise=now.feet.rise - self._rate_of("lowering"),
+            )
+        )
+
+    def lift(self) -> Array:
+        """Returns the heights of the paths of the feet (6,) over the stance [m]."""
+        return np.asarray(self.now.feet.height - self.paths.home_height)
+
+    def neighbour(self) -> tuple[Pose | None, float]:
+        """Returns the pose after (else before) the present one, and its time from there [s]."""
+        if self.after is not None:
+            return self.after.pose, self.period
+        return None if self.before is None else self.before.pose, -self.period
+
+    def motion(self) -> Neighbours:
+        """Returns the masses and poses of the three steps; at section ends, of one alone."""
+        before, now, after = self.before, self.now, self.after
+        assert now.masses is not None
+        if before is None or after is None:
+            return Neighbours((None, now.masses, None), (None, now.pose, None))
+        return Neighbours(
+            (before.masses, now.masses, after.masses), (before.pose, now.pose, after.pose)
+        )

@@ -1,0 +1,133 @@
+"""Decides whether the planned load and the force sensors can be trusted (C33, C34). C: trust.h.
+
+The planned load does not apply to a robot that slides, whose joints cannot follow, or that is far
+too heavy. Then the trust, a factor on all torques, goes to 0 and the robot walks under kinematic
+control.
+
+A sensor is doubted when it contradicts the plan for too long: it reports a force on a foot in the
+middle of its swing, or none on a foot that should carry its load while all feet together lack
+weight. It is trusted again after one and a half gait cycles without a contradiction.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hexapod_cosim.controller.memory import Stateful
+from hexapod_cosim.controller.plane import LEGS, Mask
+
+SLIDING_DRAG = 0.55  # 1    common tangential over normal force beyond the plan: only a robot that
+# slides exceeds it, or one on a slope of 29 degrees
+CALM_CYCLES = 0.5  # 1    gait cycles without sliding until the feet are trusted again
+SLIDING_TIME = 0.04  # s    longer than a foot skids when it touches down
+JOINTS_FOLLOW, JOINTS_DO_NOT = 0.35, 0.45  # 1    share of the time with too high joint speeds
+FEET_LATE = 0.2  # 1    the same, from which feet end their swings late whatever the ground
+TRUSTED = 0.99  # 1    so near to its goal the trust is at it
+AIRBORNE_TIME = 0.06  # s    longest plausible force on a foot in mid-swing
+ABSENT_TIME = 0.10  # s    longest plausible lack of force on a standing foot; both exceed the lag
+MISSING_SHARE = 0.92  # 1    of the weight: with less, the force of some foot is not reported
+MEMORY_CYCLES = 1.5  # 1    gait cycles without contradiction until a sensor is trusted again
+
+
+class Trust(Stateful):
+    """Trust in the planned load.
+
+    Attributes:
+        level: factor on all torques [1].
+        lagging: the joints cannot follow the plan.
+        overspeed_share: share of the time in which the plan exceeds a speed limit [1].
+        slide_periods: periods for which the robot has been sliding.
+        recovery_periods: periods that remain until feedback resumes after sliding.
+    """
+
+    STATE = ("level", "lagging", "overspeed_share", "slide_periods", "recovery_periods")
+
+    def __init__(self, *, cycle: float, period: float, load_time: float) -> None:
+        """Trusts the plan. cycle: of the gait [s]; load_time: smoothing of the trust [s]."""
+        self.period = period
+        self.follow_load = 1.0 - math.exp(-period / load_time)
+        self.follow_cycle = 1.0 - math.exp(-period / cycle)
+        self.calm = round(CALM_CYCLES * cycle / period)  # periods
+        self.reset()
+
+    def reset(self) -> None:
+        """Trusts the plan wholly."""
+        self.level, self.lagging, self.overspeed_share = 1.0, False, 0.0
+        self.slide_periods, self.recovery_periods = 0, 0
+
+    def feet_late(self) -> bool:
+        """Returns whether the joints are so slow that feet end their swings late anywhere."""
+        return self.overspeed_share > FEET_LATE
+
+    def step(self, drag: float, *, overspeed: bool, overburdened: bool) -> float:
+        """Advances the trust by one period (C33) and returns the level that it goes to, 0 or 1.
+
+        drag: common tangential force of the feet above the plan, over the normal force [1];
+        overspeed: the plan exceeds the speed limit of some joint; overburdened: the robot is far
+        too heavy for its servos.
+        """
+        self.overspeed_share += self.follow_cycle * (float(overspeed) - self.overspeed_share)
+        self.lagging = self.overspeed_share > (JOINTS_FOLLOW if self.lagging else JOINTS_DO_NOT)
+        self.slide_periods = self.slide_periods + 1 if drag > SLIDING_DRAG else 0
+        if self.slide_periods * self.period > SLIDING_TIME:
+            self.recovery_periods = self.calm
+        elif self.recovery_periods:
+            self.recovery_periods -= 1
+        goal = 0.0 if self.recovery_periods or self.lagging or overburdened else 1.0
+        if self.level != goal:
+            self.level += self.follow_load * (goal - self.level)
+            if abs(goal - self.level) < 1.0 - TRUSTED:
+                self.level = goal
+        return goal
+
+
+class SensorWatch(Stateful):
+    """Finds the foot sensors that contradict the plan for too long (C34).
+
+    Attributes, (6,) each:
+        contradicted: for how long a sensor has contradicted the plan [s].
+        left: time until a sensor is trusted again [s].
+    """
+
+    STATE = ("contradicted", "left")
+
+    def __init__(self, weight: float, *, cycle: float, period: float) -> None:
+        """Starts with all sensors trusted.
+
+        weight: of the robot without payload [N]; cycle: of the gait [s]; period [s].
+        """
+        self.period, self.missing = period, MISSING_SHARE * weight
+        self.memory = MEMORY_CYCLES * cycle
+        self.reset()
+
+    def reset(self) -> None:
+        """Trusts all force sensors again and forgets their contradictions."""
+        self.contradicted, self.left = np.zeros((2, LEGS))
+
+    def busy(self) -> bool:
+        """Returns whether some sensor contradicts the plan or is doubted."""
+        return bool(self.contradicted.any() or self.left.any())
+
+    @property
+    def doubted(self) -> Mask:
+        """Returns the sensors (6,) that are not trusted."""
+        return self.left > 0.0
+
+    def look(self, touching: Mask, total: float, standing: Mask, high: Mask) -> Mask:
+        """Advances the times by one period and returns `doubted`.
+
+        Args:
+            touching: (6,) feet that report a force.
+            total: the sum of all normal forces [N].
+            standing: (6,) legs that are planned to carry their whole share.
+            high: (6,) feet that are planned well above the ground.
+        """
+        absent = (total < self.missing) & standing & ~touching
+        wrong = (touching & high) | absent
+        self.contradicted = np.where(wrong, self.contradicted + self.period, 0.0)
+        too_long = self.contradicted > np.where(high, AIRBORNE_TIME, ABSENT_TIME)
+        rest = np.maximum(self.left - self.period, 0.0)
+        self.left = np.where(too_long, self.memory, rest)
+        return self.doubted

@@ -1,0 +1,278 @@
+"""Computes the paths of the feet from the motion of the body. C: foot_paths.h.
+
+The walking frame K is the torso frame of a robot at its nominal height and level posture. It moves
+over the ground with the velocity v = vx + i vy and the yaw rate w. Horizontal points are complex
+numbers p = x + i y. The ground frame is the walking frame at the begin of the walk.
+
+A swinging foot moves from the ground point that it left to the ground point where it will be
+half-way through the next stance under its stance position. Both points are fixed to the ground, so
+a blend (C6) whose ends have neither speed nor acceleration lets the foot leave and meet the ground
+without sliding.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hexapod_cosim.controller.memory import Stateful
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, cis
+from hexapod_cosim.controller.walk.gait import Gait
+from hexapod_cosim.controller.walk.gait_clock import CLOCK_EPSILON, NO_LEG, GaitClock
+from hexapod_cosim.controller.walk.swing import Twist, blend, hop, travel
+
+FREEZE = 0.75  # 1    part of the swing after which the landing point stays fixed to the ground
+SAME_DISTANCE = 1e-6  # m    distances that differ by less are equal
+HOME_TOLERANCE = 1e-9  # m    a foot this close to its stance position need not step any more
+NEARLY_DONE = 1e-12  # 1    floor of 1 - s
+
+
+class PlannedFeet(NamedTuple):
+    """Planned feet at one step, (6,) each unless stated otherwise.
+
+    They are in the walking frame, except `goal`, `pull`, `way` and `turn`: ground frame.
+    """
+
+    plane: Plane  # m    centres, x + i y
+    height: Array  # m    z
+    velocity: Plane  # m/s    of x + i y
+    rise: Array  # m/s    of z
+    phase: Array  # 1    in [0, 1)
+    blend: Array  # 1    s of swinging feet, else 0
+    goal: Plane  # m    landing point of a swinging foot, position of a standing one
+    pull: Plane  # m    q of C5, (goal - foot)/(1 - s), of swinging feet; 0 of standing ones
+    rolled: Array  # m    outwards from the stance to the position that the foot aims at (C53)
+    way: complex  # m    scalar: position of the walking frame, D of C3
+    turn: float  # rad    scalar: heading of the walking frame, theta of C3
+    twist: Twist  # of the body
+
+
+class FootPaths(Stateful):
+    """Paths of the feet within a section of the walk.
+
+    Attributes:
+        clock: the gait clock, which decides which legs swing.
+        met: (6,) feet that have met the ground on their way down, and stay where they are.
+        narrowing: part of the way to the narrow stance that the steps aim at.
+    """
+
+    STATE = ("clock", "met", "narrowing")
+
+    def __init__(
+        self,
+        gait: Gait,
+        home: Array,
+        *,
+        period: float,
+        inward: Plane | None = None,
+        turned: Array | None = None,
+    ) -> None:
+        """Puts all feet in the stance.
+
+        Args:
+            gait: of the robot.
+            home: (6, 3) centres of the feet in the stance, torso frame [m].
+            period: of the controller [s].
+            inward: (6,) from the stance to the narrow stance, torso frame [m]; by default 0.
+            turned: (6,) distances that the feet roll outwards on this way [m]; by default 0.
+        """
+        self.gait, self.period = gait, period
+        self.clock = GaitClock(gait, period=period)
+        self.swing_time = gait.period * (1.0 - gait.duty)
+        # from the lift-off to the middle of the next stance
+        self.landing_lead = 0.5 * gait.period * gait.duty + self.swing_time
+        self.home, self.home_height = home[:, 0] + 1j * home[:, 1], home[:, 2].copy()
+        self.inward = np.zeros(LEGS, dtype=np.complex128) if inward is None else inward
+        self.turned = np.zeros(LEGS) if turned is None else turned
+        self.met: Mask = NO_LEG
+        self.narrowing = 0.0
+
+    def _rest(self, plane: Plane) -> PlannedFeet:
+        """Stops the gait clock at its begin; returns feet that stand still at `plane`."""
+        nothing, still = np.zeros(LEGS), np.zeros(LEGS, dtype=np.complex128)
+        self.clock.stop()
+        self.met = NO_LEG
+        return PlannedFeet(
+            plane=plane,
+            height=self.home_height,
+            velocity=still,
+            rise=nothing,
+            phase=self.clock.phase_after(0),
+            blend=nothing,
+            goal=plane,
+            pull=still,
+            rolled=self.narrowing * self.turned,
+            way=0j,
+            turn=0.0,
+            twist=Twist(0j, 0.0),
+        )
+
+    def reset(self) -> PlannedFeet:
+        """Puts all feet in the stance and stops the gait clock; returns the feet."""
+        self.narrowing = 0.0
+        return self._rest(self.home)
+
+    def _aims(self) -> Plane:
+        """Returns the stance positions (6,) that the steps aim at, walking frame [m] (C53)."""
+        return np.asarray(self.home + self.narrowing * self.inward)
+
+    def _come_home(self, swung: Mask, now: PlannedFeet) -> tuple[bool, Plane]:
+        """Lets feet that are in their stance positions skip their steps.
+
+        swung: (6,) legs that were in the air until now. Returns whether all feet stand in their
+        stance positions, and the positions of the feet (6,) [m]; a foot that has just landed is at
+        its goal.
+        """
+        landed = swung & self.clock.standing
+        feet = np.where(landed, cis(-now.turn) * (now.goal - now.way), now.plane)
+        return self.clock.skip(np.abs(feet - self._aims()) < HOME_TOLERANCE), feet
+
+    def _ground_of(self, feet: PlannedFeet) -> Plane:
+        """Returns the feet (6,) in the ground frame [m] (C5)."""
+        return feet.goal - feet.pull * (1.0 - feet.blend)
+
+    def _place_feet(self, feet: PlannedFeet, carried: Plane) -> PlannedFeet:
+        """Computes positions and velocities of feet with known phases, goals and pulls (C5 to C8).
+
+        carried: (6,) feet at the step before, ground frame [m].
+        """
+        back, tau = cis(-feet.turn), self.clock.progress(feet.phase)
+        s, slope = blend(tau)
+        feet = feet._replace(blend=np.where(self.clock.swinging, s, 0.0))
+        lift, climb = hop(
+            tau,
+            top=self.gait.step_height,
+            down=self.gait.touchdown_speed * self.swing_time,
+        )
+        was = back * (carried - feet.way)
+        # 1/s    at which the feet pass through their paths
+        pace = 0.0 if self.clock.held else 1.0 / self.swing_time
+        pulled = back * feet.pull * (slope * pace)
+        # a foot on the ground: dp/dt = -(v + i w p)
+        velocity = pulled - (feet.twist.velocity + 1j * feet.twist.yaw_rate * was)
+        return feet._replace(
+            plane=back * (self._ground_of(feet) - feet.way),
+            height=self.home_height + np.where(self.clock.swinging, lift, 0.0),
+            velocity=velocity,
+            rise=np.where(self.clock.swinging, climb * pace, 0.0),
+        )
+
+    def _set_out(self, now: PlannedFeet, twist: Twist) -> PlannedFeet:
+        """Computes the present step again, with the legs that swing in the new section."""
+        clock = self.clock
+        phase = clock.phase_after(clock.before)
+        s = np.where(clock.swinging, blend(clock.progress(phase))[0], 0.0)
+        pull = np.where(clock.swinging, now.pull, 0.0)
+        feet = now._replace(phase=phase, blend=s, pull=pull, twist=twist)
+        return self._place_feet(feet, self._ground_of(feet))
+
+    def plan(self, now: PlannedFeet, number: int, *, going: bool, twist: Twist) -> PlannedFeet:
+        """Begins a new section after the present step.
+
+        Args:
+            now: the feet at the present step.
+            number: periods since the last section began.
+            going: the body moves or is commanded to; otherwise feet step home and the gait clock
+                then stops.
+            twist: the motion of the body now.
+
+        Returns:
+            The feet at the present step, from which the section starts.
+        """
+        clock = self.clock
+        if not clock.walking and not going:
+            return self._rest(now.plane)
+        swung, kept = clock.swinging, clock.stays
+        clock.begin_section(number)
+        if clock.ending:
+            clock.keep_down(kept)
+        elif not going:
+            done, feet = self._come_home(swung, now)
+            if done:
+                return self._rest(feet)
+        clock.set_out()
+        return self._set_out(now, twist)
+
+    def hold(self, now: PlannedFeet, number: int, *, twist: Twist) -> PlannedFeet:
+        """Begins a section in which the gait clock stands still while the body moves on (C50).
+
+        Arguments and result are those of plan().
+        """
+        self.clock.hold(number)
+        return self._set_out(now, twist)
+
+    def _farthest(self, feet: PlannedFeet, begin: Array) -> float:
+        """Returns how far a foot will be from its stance position at its lift-off [m] (C55).
+
+        It is that of the farthest foot. feet: that stand; begin: (6,) phases at the begin of the
+        walk [cycles].
+        """
+        left = self.gait.duty - begin + CLOCK_EPSILON
+        time = (left - np.floor(left)) * self.gait.period
+        motion = feet.twist.velocity + 1j * feet.twist.yaw_rate * feet.plane
+        return float(np.abs(feet.plane - motion * time - self._aims()).max())
+
+    def join(self, feet: PlannedFeet) -> PlannedFeet:
+        """Begins the walk anew with feet that stand under a moving body (C55).
+
+        One leg begins to give up its load: the first of those with which the farthest foot goes
+        least far.
+        """
+        clock = self.clock
+        if not clock.walking:
+            return self._rest(feet.plane)
+        least = np.inf
+        unloads, offset = clock.unloads, np.array(self.gait.offsets)
+        for first in range(LEGS):
+            begin = unloads + (offset - offset[first])
+            far = self._farthest(feet, begin)
+            if far < least - SAME_DISTANCE:
+                least = far
+                clock.start_at(begin)
+        clock.start_standing()
+        self.met = NO_LEG
+        return feet
+
+    def _landing(self, tau: Array, twist: Twist) -> Plane:
+        """Returns the landing points (6,) in the walking frame [m] (C4, C53)."""
+        ahead = self.landing_lead - tau * self.swing_time
+        return np.asarray(cis(twist.yaw_rate * ahead) * self._aims() + travel(twist, ahead))
+
+    def _odometry(self, before: PlannedFeet, twist: Twist) -> tuple[complex, float]:
+        """Returns position [m] and heading [rad] of the walking frame in the ground frame (C3)."""
+        last = before.twist
+        mean = Twist(
+            0.5 * (twist.velocity + last.velocity),
+            0.5 * (twist.yaw_rate + last.yaw_rate),
+        )
+        way = before.way + cis(before.turn) * travel(mean, self.period)
+        return complex(way), before.turn + mean.yaw_rate * self.period
+
+    def walk(self, number: int, twist: Twist, before: PlannedFeet) -> PlannedFeet:
+        """Returns the feet `number` periods after the first step of the section.
+
+        before: the step before it.
+        """
+        clock = self.clock
+        if not clock.walking:
+            return before
+        way, turn = self._odometry(before, twist)
+        phase = clock.phase_after(clock.reached(number))
+        tau = clock.progress(phase)
+        free = clock.swinging & (tau < FREEZE)
+        if number == 1:
+            free = free | (clock.swinging & clock.lifted)  # every foot is aimed once
+        goal = np.where(free, way + cis(turn) * self._landing(tau, twist), before.goal)
+        left = np.maximum(1.0 - before.blend, NEARLY_DONE)
+        pull = before.pull + (goal - before.goal) / left
+        aim = self.narrowing * self.turned
+        rolls = aim - (aim - before.rolled) * (1.0 - blend(tau)[0]) / left
+        rolled = np.where(clock.swinging & ~self.met, rolls, before.rolled)
+        # a foot stays where it met the ground (C51)
+        goal = np.where(self.met, self._ground_of(before), goal)
+        pull = np.where(self.met, 0.0, pull)
+        feet = before._replace(
+            phase=phase, goal=goal, pull=pull, rolled=rolled, way=way, turn=turn, twist=twist
+        )
+        return self._place_feet(feet, self._ground_of(before))
