@@ -1,15 +1,16 @@
 #include "hexapod/message.h"
 
-#include <ctype.h>
 #include <stdio.h>
 #include <string.h>
 
-/* Replaces the locale's sign for the decimal point, which may be several bytes,
- * by a point wherever it is between two digits. */
+static int is_digit(char c) { return c >= '0' && c <= '9'; }
+
+/* Replaces the locale's sign for the decimal point, which may be several bytes, by a point wherever
+ * it is between two digits. */
 static void replace_sign(char *text, const char *sign, size_t size) {
   char *at = text;
   while ((at = strstr(at, sign)) != NULL) {
-    if (at > text && isdigit((unsigned char)at[-1]) && isdigit((unsigned char)at[size])) {
+    if (at > text && is_digit(at[-1]) && is_digit(at[size])) {
       *at = '.';
       memmove(at + 1, at + size, strlen(at + size) + 1);
     }
