@@ -156,12 +156,17 @@ def _sensor(fault: SensorFault) -> int:
             return 0
 
 
+def healthy_servos() -> NDArray[np.float64]:
+    """Returns strength and lock (36,) of servos without faults."""
+    return np.repeat([1.0, 0.0], len(LEG_NAMES) * len(JOINT_NAMES))
+
+
 def servo_rows(faults: Sequence[ServoFault], times: NDArray[np.float64]) -> NDArray[np.float64]:
     """Returns strength and lock of all servos in the steps that begin at times [s from the start]
     (times, 36). Where faults of a servo overlap, the last one in the list holds.
     """
-    rows = np.zeros((len(times), 2, len(LEG_NAMES), len(JOINT_NAMES)))
-    rows[:, 0] = 1.0
+    shape = len(times), 2, len(LEG_NAMES), len(JOINT_NAMES)
+    rows = np.tile(healthy_servos(), (len(times), 1)).reshape(shape)
     for fault in faults:
         state = SERVO_STATES.get(fault.fault, (fault.share, 0.0))
         for j, joint in enumerate(JOINT_NAMES):
