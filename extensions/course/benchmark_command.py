@@ -20,7 +20,6 @@ from hexapod_cosim.cosim.cli.terminal import (
     show_json,
     show_table,
     show_text,
-    waiting,
     warn,
 )
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json
@@ -40,6 +39,7 @@ from hexapod_cosim.extensions.course.records import (
     load_course,
     read_entries,
 )
+from hexapod_cosim.extensions.course.report import write_course_report
 from hexapod_cosim.extensions.course.runs import Run, run_count, run_course
 from hexapod_cosim.extensions.course.store import FILES, read_table, write_result
 from hexapod_cosim.extensions.course.table import Table
@@ -168,22 +168,13 @@ def _run_into(
 def _write(
     table: Table, folder: Path, command: str, *, complete: bool
 ) -> tuple[dict[str, Any], list[Path]]:
-    """Writes result, picture and report; returns the content of benchmark.json and the files."""
-    # imported only here because matplotlib is slow to import
-    from hexapod_cosim.extensions.course.report import write_course_report  # noqa: PLC0415
-
+    """Writes result and report; returns the content of benchmark.json and the files."""
     content, files = write_result(table, folder, command=command, complete=complete)
-    with waiting("drawing the picture and the report"):
-        return content, [*files, *write_course_report(table, content, folder)]
+    return content, [*files, *write_course_report(table, content, folder)]
 
 
 def report_on(folder: Path) -> list[Path]:
-    """Writes picture and report of a benchmark's folder again; returns the files.
-
-    Raises HexapodError.
-    """
-    from hexapod_cosim.extensions.course.report import write_course_report  # noqa: PLC0415  slow
-
+    """Writes the report of a benchmark's folder again; returns its file. Raises HexapodError."""
     return write_course_report(*read_table(folder), folder)
 
 
