@@ -254,6 +254,12 @@ def read_table(component: Component) -> dict[str, Any]:
     table = tomllib.loads(interface_file(component).read_text(encoding="utf-8"))
     for causality in CAUSALITIES:
         entries = table.get(causality, [])
+        if any("record" in entry for entry in entries):
+            from hexapod_cosim.cosim.interface.gain_rows import (  # noqa: PLC0415  slow to import
+                rows_of_records,
+            )
+
+            entries = rows_of_records(entries)
         table[causality] = [with_defaults(entry, causality, table["unit"]) for entry in entries]
     return table
 

@@ -188,7 +188,7 @@ def test_a_study_may_bring_its_own_fmus(tmp_path: Path) -> None:
 def test_a_refused_step_ends_the_walk_as_in_python_and_the_next_one_begins_afresh(
     runner: Runner,
 ) -> None:
-    bad = planned("walk_flat", "solver.method=rk4", "solver.step=0.005", ENDLESS)
+    bad = planned("walk_flat", "solver.method=dp54", "solver.step=0.002", ENDLESS)
     good = runner.summary(WALKS[0], gains=gains_of(WALKS[0]))
     expected, _ = in_python(bad, runner)
     found = runner.simulate(bad)
