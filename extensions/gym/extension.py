@@ -4,7 +4,7 @@ from hexapod_cosim.cosim.cli.extension import Command, Extension
 
 GYM = Command(
     name="gym",
-    about="Train, measure and export policies for reinforcement learning.",
+    about="Train and export policies for reinforcement learning.",
     place="hexapod_cosim.extensions.gym.gym_command:app",
 )
 EXTENSION = Extension(
