@@ -988,7 +988,7 @@ static const hxRange definition_ranges[] = {
     {"gravity[1]", "m/s2", -1000.0, 1000.0, offsetof(hxDefinition, gravity[0]), 0},
     {"gravity[2]", "m/s2", -1000.0, 1000.0, offsetof(hxDefinition, gravity[1]), 0},
     {"gravity[3]", "m/s2", -1000.0, 1000.0, offsetof(hxDefinition, gravity[2]), 0},
-    {"solver.method", "", 1, 5, offsetof(hxDefinition, solver.method), 1},
+    {"solver.method", "", 1, 3, offsetof(hxDefinition, solver.method), 1},
     {"solver.step", "s", 0.0, 1.0, offsetof(hxDefinition, solver.step), 0},
     {"solver.tolerance", "", 1e-13, 1.0, offsetof(hxDefinition, solver.tolerance), 0},
     {"solver.step_max", "s", 1e-09, 1.0, offsetof(hxDefinition, solver.step_max), 0},

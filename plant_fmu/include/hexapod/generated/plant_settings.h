@@ -54,10 +54,6 @@ typedef enum hxMethod {
   HX_METHOD_ROS2,
   /* explicit Dormand-Prince of order 5(4) */
   HX_METHOD_DP54,
-  /* explicit Bogacki-Shampine of order 3(2) */
-  HX_METHOD_BS32,
-  /* explicit classic Runge-Kutta of order 4, fixed step only */
-  HX_METHOD_RK4,
 } hxMethod;
 
 typedef enum hxSoilLaw {
