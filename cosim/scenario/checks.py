@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 from hexapod_cosim.controller import Parts
-from hexapod_cosim.cosim.interface.plant import Interface, load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.cosim.scenario.records import (
     MAX_STEPS,
     SETTINGS,
