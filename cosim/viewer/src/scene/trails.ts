@@ -35,7 +35,11 @@ export interface StancePhase {
 }
 
 /** Returns all stances of all feet; [] when the recording lacks the columns. */
-export function findStancePhases(recording: Recording, robot: Robot, relief: Relief): StancePhase[] {
+export function findStancePhases(
+  recording: Recording,
+  robot: Robot,
+  relief: Relief,
+): StancePhase[] {
   return robot.legs.flatMap(({ name }, index) => {
     const names = [`${name}.contact`, `${name}.slipped.x`, `${name}.slipped.y`];
     if (!recording.has(...names)) return [];
