@@ -36,7 +36,7 @@ PLANES: dict[str, dict[str, Any]] = {
     "slope": {"kind": "slope", "incline": 0.1, "heading": 0.7},
 }
 KINDS = [*PLANES, *CATALOGUE]
-BLOCKS = ["stairs", "rubble", "stepping_stones", "discrete_obstacles"]
+BLOCKS = ["stairs", "rubble", "stepping_stones"]
 
 
 @cache
