@@ -122,23 +122,6 @@ def test_a_step_ends_on_each_touch_down(core: ct.CDLL, kind: str) -> None:
     assert max(landed) < LANDED
 
 
-@pytest.mark.parametrize("kind", BLOCKS)
-def test_feet_with_one_contact_each_move_by_the_bits_of_rows_apart(
-    core: ct.CDLL, kind: str
-) -> None:
-    """A step computes their contacts in one row, but not where feet resist spin: here by moments of
-    1e-290 N m, which change no bit.
-    """
-    ground, found = ground_of(core, kind), []
-    for radius in (0.0, 1e-290):
-        plant = put(core, robot_on(kind, friction={"spin_radius": radius}), ground)
-        march(plant, 2.0)
-        output = plant.output()
-        figures = [output.energy.dissipated, output.energy.residual, *output.foot.slip_distance]
-        found.append((plant.bodies.tobytes(), figures, output.solver.evaluations))
-    assert found[0] == found[1]
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_two_instances_and_a_restored_one_move_by_the_same_bits(core: ct.CDLL, kind: str) -> None:
     ground, robot = ground_of(core, kind), robot_on(kind)

@@ -96,7 +96,8 @@ HX_API void hx_probe_soil(const hxSoilDefinition *definition, const double *row,
  * back. */
 HX_API void hx_probe_footprints(double depth[3][4]) {
   static const double place[4] = {0.0, 987.0, 988.0, 1499.0};
-  static hxFootprintLog log;
+  static hxFootprint lost[HX_FOOTPRINTS];
+  static hxFootprintLog log = {.lost = lost};
   hx_footprints_clear(&log);
   for (int k = 0; k < 1500; ++k)
     hx_footprints_add(&log, &(hxFootprint){k, 0.0, 1e-3 * (k + 1), 0.4});
