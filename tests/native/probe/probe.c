@@ -249,7 +249,10 @@ HX_API void hx_probe_shares(int count, const double *depth, const double *normal
 /* The upper bound of a sphere's depth in a grid; out: one number. */
 HX_API void hx_probe_depth_bound(const hxTerrain *terrain, const double centre[3], double radius,
                                  double out[1]) {
-  out[0] = hx_terrain_depth_bound(terrain, centre, radius);
+  static hxModel model;
+  const hxVec3 point = hx_splat_vec3(centre);
+  model.terrain = terrain, model.radius[HX_FOOT] = radius;
+  out[0] = hx_lane(hx_grid_depth_bound(&model, HX_FOOT, &point), 0);
 }
 
 /* Switches the plant's contacts and returns them. state: closed, damping, impact speed. */
