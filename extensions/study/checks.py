@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from hexapod_cosim.controller.gains import PARTS
-from hexapod_cosim.cosim.interface.plant import Interface, load_interface
+from hexapod_cosim.controller.gains import SECTIONS
+from hexapod_cosim.cosim.interface.plant import load_interface
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.cosim.scenario.controls import LAW
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -94,7 +95,7 @@ def check_settable(name: str, where: str) -> None:
 
 def gain_specs() -> dict[str, Spec]:
     """Returns what all gains may be by their names as factors, such as gains.hold.path_rate."""
-    parts = {name: PARTS[name] for name in PARTS if name not in ("requirements", "margins")}
+    parts = {name: SECTIONS[name] for name in SECTIONS if name not in ("requirements", "margins")}
     return {
         f"{GAINS}{part}.{name}": spec
         for part, record in parts.items()
