@@ -57,21 +57,8 @@ def load_study(path_or_name: str | Path, *, controls: Sequence[str] = ()) -> Stu
         path = bundled[str(path_or_name)]
     with reading_toml(path, kind="study", name="the study", names=list_studies, error=StudyError):
         table = parse_toml(read_text(path))
-    if controls:
-        table = _with_controls(table, controls)
     where = path.name if path in bundled.values() else str(path)
-    return study_from_table(table, where=where, folder=path.parent)
-
-
-def _with_controls(table: dict[str, Any], texts: Sequence[str]) -> dict[str, Any]:
-    """Returns a study's tables with other controls. Raises StudyError."""
-    full = [control.text for control in parse_controls(texts, where="--control")]
-    if not isinstance(table.get("optimise"), dict):
-        return {**table, "controls": full}
-    fix = "run the optimisation for each control, into folders of their own"
-    what = "an optimisation has one control"
-    require(len(full) == 1, len(full), "one --control", "--control", what=what, fix=fix)
-    return {**table, "optimise": {**table["optimise"], "control": full[0]}}
+    return study_from_table(table, where=where, folder=path.parent, controls=controls)
 
 
 def study_from_table(
@@ -79,6 +66,7 @@ def study_from_table(
     *,
     where: str,
     folder: Path = Path(),
+    controls: Sequence[str] = (),
     scenarios: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Study:
     """Makes a checked study from the tables of its file. Raises StudyError.
@@ -86,6 +74,7 @@ def study_from_table(
     Args:
         where: name of the file, for messages.
         folder: folder of the file, which paths of scenario files are relative to.
+        controls: texts that replace the controls of the file.
         scenarios: the scenarios by name, when no file shall be read and nothing be checked again.
     """
     what, fix = "not a key of an optimisation", "leave it out: [optimise] says what is run"
@@ -93,9 +82,14 @@ def study_from_table(
         require(key not in table, key, "[optimise] alone", where, what=what, fix=fix)
     read = read_table(table, STUDY, where)
     optimise, factors = read["optimise"] or (None, read["factors"])
-    controls = _controls(read, folder, where)
+    laws = _controls(read, folder, controls, where)
     if optimise is not None:
-        optimise = replace(optimise, control=controls[0].label)
+        what, fix = "an optimisation has one control", "run it for each, into folders of their own"
+        require(len(laws) == 1, len(laws), "one --control", where, what=what, fix=fix)
+        optimise = replace(optimise, control=laws[0].label)
+        table = {**table, "optimise": {**table["optimise"], "control": laws[0].text}}
+    else:
+        table = {**table, "controls": [law.text for law in laws]}
     study = Study(
         title=read["title"] or Path(where).stem,
         cases={},
@@ -103,7 +97,7 @@ def study_from_table(
         design=read["design"],
         points=read["points"] or 1,
         seeds=read["seeds"],
-        laws=controls,
+        laws=laws,
         seed=read["seed"],
         optimise=optimise,
         source=dict(table),
@@ -118,11 +112,14 @@ def study_from_table(
     return study
 
 
-def _controls(read: Mapping[str, Any], folder: Path, where: str) -> tuple[Control, ...]:
-    """Returns the controls of a study's file. Raises ScenarioError."""
-    texts, place = read["controls"], f"{where}: controls"
-    if read["optimise"]:
-        texts, place = [read["optimise"][0].control], f"{where}: optimise.control"
+def _controls(
+    read: Mapping[str, Any], folder: Path, given: Sequence[str], where: str
+) -> tuple[Control, ...]:
+    """Returns the given controls, or else those of a study's file. Raises ScenarioError."""
+    if given:
+        return parse_controls(given, where="--control")
+    texts = [read["optimise"][0].control] if read["optimise"] else read["controls"]
+    place = f"{where}: {'optimise.control' if read['optimise'] else 'controls'}"
     return parse_controls([control_beside(text, folder) for text in texts], where=place)
 
 
