@@ -12,8 +12,9 @@ from dataclasses import dataclass, fields
 from typing import Annotated, Any
 
 from hexapod_cosim.models import HexapodError, Robot
-from hexapod_cosim.models.schema import Number, Text
+from hexapod_cosim.models.schema import Flag, Number, Text
 
+Switch = Annotated[bool, Flag()]
 Real = Annotated[float, Number("SI unit")]
 NotNegative = Annotated[float, Number("SI unit", at_least=0.0)]
 Positive = Annotated[float, Number("SI unit", above=0.0)]
@@ -55,26 +56,28 @@ class Parts:
     """
 
     support: Annotated[
-        bool, Row("servo torques that carry each leg's share of weight and acceleration")
+        Switch, Row("servo torques that carry each leg's share of weight and acceleration")
     ] = True
-    paper_share: Annotated[bool, Row("a share of the deviations of the feet is taken back")] = True
+    paper_share: Annotated[Switch, Row("a share of the deviations of the feet is taken back")] = (
+        True
+    )
     paper_pid: Annotated[
-        bool,
+        Switch,
         Row("feet yield to the forces that make them slip, and return to their planned places"),
     ] = True
     paper_suspension: Annotated[
-        bool,
+        Switch,
         Row("a foot yields where it meets the ground early and extends where it meets it late"),
     ] = True
-    touchdown: Annotated[bool, Row("early and late touch-downs are answered")] = True
-    posture: Annotated[bool, Row("roll, pitch and height are held")] = True
-    sway: Annotated[bool, Row("under a payload the torso moves against the swinging legs")] = True
-    path: Annotated[bool, Row("the walked way is measured at the feet and held to the command")] = (
-        True
-    )
-    limits: Annotated[bool, Row("torques are limited")] = True
+    touchdown: Annotated[Switch, Row("early and late touch-downs are answered")] = True
+    posture: Annotated[Switch, Row("roll, pitch and height are held")] = True
+    sway: Annotated[Switch, Row("under a payload the torso moves against the swinging legs")] = True
+    path: Annotated[
+        Switch, Row("the walked way is measured at the feet and held to the command")
+    ] = True
+    limits: Annotated[Switch, Row("torques are limited")] = True
     fallback: Annotated[
-        bool,
+        Switch,
         Row(
             "no feedback from a sensor that contradicts the plan; kinematic control while the "
             "robot slides or outruns its joints"
@@ -82,6 +85,7 @@ class Parts:
     ] = True
     squeeze: Annotated[
         float,
+        Number("1", at_least=0.0, at_most=0.99),
         Row(
             "Weight of the servos' torques against the feet's use of friction in the planned "
             "squeeze of the legs; 0 plans none",

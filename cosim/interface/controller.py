@@ -12,8 +12,8 @@ from hexapod_cosim.controller import Controller, Gains, Gait, Parts
 from hexapod_cosim.controller.controller import gains_warnings
 from hexapod_cosim.controller.size import requirements_for, sections_for
 from hexapod_cosim.cosim.common.components import CONTROLLER
-from hexapod_cosim.cosim.interface.plant import Interface, expand_interface
-from hexapod_cosim.cosim.interface.start_values import parameter_values
+from hexapod_cosim.cosim.interface.plant import expand_interface, parameter_values
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.models import Robot
 
 ALL_PARTS = Parts()

@@ -190,16 +190,6 @@ STANCE_CHANGE = Vector("m", 2)
 WALK_KEYS = ("stance",)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Walk:
-    """The stance that a scenario names: what the walk is, besides the gait in [gait]."""
-
-    # OWN: of the robot file. DESIGNED: that of `hexapod design --stance` for the gait. CHOSEN: that
-    # which compliant control chooses, with its gait unless [gait] names one. Two lengths: by which
-    # the feet stand further out from the hips, and deeper below them [m]. None: not named
-    stance: str | tuple[float, float] | None = None
-
-
 def default_formats() -> tuple[str, ...]:
     """Returns the formats of recordings: CSV, and Parquet if the extra `parquet` is installed."""
     return ("parquet", "csv") if has_pyarrow() else ("csv",)
@@ -232,7 +222,10 @@ class Scenario:
     macro_step: Annotated[float, Number("s", above=0.0, at_most=0.1)] = DEFAULT_PERIOD
     seed: Annotated[int, Whole()] = 0
     gravity: tuple[float, float, float] | None = None  # m/s2    None: the robot's own
-    walk: Walk = Walk()
+    # OWN: of the robot file. DESIGNED: that of least heat for the gait. CHOSEN: that of compliant
+    # control, with its gait unless [gait] names one. Two lengths: by which the feet stand further
+    # out from the hips, and deeper below them [m]. None: not named
+    stance: str | tuple[float, float] | None = None  # key of [walk]
     settings: Mapping[str, Mapping[str, Any]]  # differences from the robot file, by section
     commands: tuple[Command, ...]  # in order of time
     events: tuple[Event, ...] = ()
@@ -257,7 +250,7 @@ class Scenario:
     def names_walk(self) -> bool:
         """Whether the scenario names a gait, its timing or a stance; else the control chooses."""
         timing = {"name", "period", "duty"} & set(self.settings.get("gait", {}))
-        return bool(timing) or self.walk.stance is not None
+        return bool(timing) or self.stance is not None
 
     @property
     def pushes(self) -> tuple[Push, ...]:
@@ -295,8 +288,8 @@ class Scenario:
         plain = {key: getattr(self, key) for key in names if key in ("control", *PLAIN_KEYS)}
         plain |= {} if self.gravity is None else {"gravity": list(self.gravity)}
         tables = {key: dict(value) for key, value in self.settings.items() if value}
-        if self.walk.stance is not None:
-            named = self.walk.stance
+        if self.stance is not None:
+            named = self.stance
             tables["walk"] = {"stance": named if isinstance(named, str) else list(named)}
         if self.control_settings:  # a table, which stands behind the plain keys
             tables["control"] = {"law": plain.pop("control"), **self.control_settings}

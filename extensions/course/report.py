@@ -80,7 +80,7 @@ def write_course_report(table: Table, content: Mapping[str, Any], folder: Path) 
     course = table.course
     page = render(
         "course.html.jinja",
-        extension="course",
+        package=__package__,
         controls=table.controls,
         title=f"Course {course.version}, split {course.split}: {', '.join(table.controls)}",
         headline=headline(table),

@@ -18,7 +18,7 @@ from hexapod_cosim.extensions.course.runs import Run
 from hexapod_cosim.extensions.course.statistics import DRAWS
 from hexapod_cosim.extensions.course.table import Table
 
-RESULT, RUNS = "benchmark.json", "runs.csv"
+RESULT, RUNS = FILES = ("benchmark.json", "runs.csv")
 FORMAT = 1
 METHODS = {  # how the intervals are made
     "success": "Wilson, 95 %",

@@ -8,5 +8,7 @@ GYM = Command(
     place="hexapod_cosim.extensions.gym.gym_command:app",
 )
 EXTENSION = Extension(
-    commands=[GYM], lists={"environments": "hexapod_cosim.extensions.gym.settings:environment_rows"}
+    commands=[GYM],
+    lists={"environments": "hexapod_cosim.extensions.gym.settings:environment_rows"},
+    interfaces=["hexapod_cosim.extensions.gym.policy:default_interface"],
 )

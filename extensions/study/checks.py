@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from hexapod_cosim.controller.gains import SECTIONS
-from hexapod_cosim.cosim.interface.plant import Interface, load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.cosim.scenario.controls import LAW
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario

@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
 from hexapod_cosim.cosim.common.files import (
+    RESUMABLE,
     RUN_FILE,
     RUNNING,
     atomic_path,
@@ -57,6 +58,7 @@ def begin_folder(folder: Path, manifest: Mapping[str, Any], *, command: str) -> 
     clear_folder(folder)
     write_json(folder / MANIFEST, manifest)
     facts = {"kind": KIND, "status": RUNNING, "title": manifest["title"], "command": command}
+    facts |= {RESUMABLE: True}
     write_json(folder / RUN_FILE, facts)
 
 

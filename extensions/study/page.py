@@ -160,7 +160,7 @@ def write_study_report(results: Results, folder: Path) -> list[Path]:
     files = save(drawing, folder / FIGURES_FOLDER) if drawing else []
     page = render(
         "study.html.jinja",
-        extension="study",
+        package=__package__,
         controls=results.study.controls,
         results=results,
         cards=cards(results),
