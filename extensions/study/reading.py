@@ -38,7 +38,15 @@ from hexapod_cosim.extensions.study.rules import Rules, read_table, require
 from hexapod_cosim.models import HexapodError, unknown_name
 from hexapod_cosim.models.errors import refuse_path
 from hexapod_cosim.models.files import read_text
-from hexapod_cosim.models.schema import parse_toml, reading_toml
+from hexapod_cosim.models.schema import (
+    Choice,
+    Flag,
+    Text,
+    Whole,
+    expect_table,
+    parse_toml,
+    reading_toml,
+)
 
 OF_A_SWEEP = ("factors", "design", "points", "seeds", "controls")  # not of an optimisation
 
@@ -131,21 +139,24 @@ def _check_points(points: int | None, study: Study) -> None:
     require((points is not None) == drawn, points, expected, place, fix=fix)
 
 
+def _scenario(value: Any, where: str) -> Any:
+    named = isinstance(value, str | Mapping)
+    require(named, value, "a scenario's name or table", where)
+    return value
+
+
 STUDY: Rules = {
-    "title": (rules.text, ""),
-    "scenario": (
-        rules.simple(lambda value: isinstance(value, str | Mapping), "a scenario's name or table"),
-        "walk_flat",
-    ),
-    "set": (rules.table, {}),
-    "seed": (rules.whole(0, 2**32 - 1), 0),  # that all random number generators accept
-    "variation": (rules.boolean, None),
+    "title": (Text().read, ""),
+    "scenario": (_scenario, "walk_flat"),
+    "set": (expect_table, {}),
+    "seed": (Whole().read, 0),
+    "variation": (Flag().read, None),
     "optimise": (read_optimise, None),
     "factors": (read_factors, ()),
-    "design": (rules.name_of(DESIGNS), GRID),
-    "points": (rules.whole(1, 10**7), None),
-    "seeds": (rules.seeds(10**7), range(1)),
-    "controls": (rules.texts('controls = ["kinematic", "law.py:Class"]'), list(COMPARED)),
+    "design": (Choice(DESIGNS).read, GRID),
+    "points": (rules.count, None),
+    "seeds": (rules.seeds, range(1)),
+    "controls": (rules.texts, list(COMPARED)),
 }
 
 

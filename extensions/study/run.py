@@ -46,9 +46,10 @@ from hexapod_cosim.extensions.study.job import make_job, manifest_of
 from hexapod_cosim.extensions.study.orders import count_runs, sweep_orders
 from hexapod_cosim.extensions.study.page import (
     Table,
+    best_settings,
     failure_table,
     notes,
-    optimum_tables,
+    optimum_table,
     overall_table,
     write_study_report,
 )
@@ -185,8 +186,9 @@ def show_study(found: Results) -> None:
         show_text(f"{METHOD}.")
     for count, control, how, reason in failure_table(found).rows[:MAX_REASONS]:
         show_text(f"{count:>6} x {control} {how}: {reason}")
-    for table in optimum_tables(found):
-        _show(table)
+    if found.optimum is not None:
+        show_text(best_settings(found))
+        _show(optimum_table(found))
 
 
 def _show(table: Table) -> None:
