@@ -107,16 +107,15 @@ def trial_orders(
     ]
 
 
+def count_points(study: Study) -> int:
+    """Returns the number of points of a study without an optimiser."""
+    lengths = [len(factor.values) for factor in study.factors]
+    grid = math.prod(lengths if study.design == GRID else lengths[:1])
+    return study.points if study.design in DRAWN else grid
+
+
 def count_runs(study: Study) -> int:
     """Returns the number of runs of a study."""
     if study.optimise is not None:
         return study.optimise.count
     return count_points(study) * len(study.seeds) * len(study.controls)
-
-
-def count_points(study: Study) -> int:
-    """Returns the number of points of a study without an optimiser."""
-    lengths = [len(factor.values) for factor in study.factors]
-    if study.design in DRAWN:
-        return study.points
-    return math.prod(lengths if study.design == GRID else lengths[:1])

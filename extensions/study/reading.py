@@ -165,27 +165,35 @@ def _cases(study: Study, folder: Path) -> dict[str, Case]:
 
     They are the study's own one, those of the factor `scenario` and those of an optimisation.
     """
-    source, where, asked = study.source, study.where, study.optimise
-    own = source.get("scenario", "walk_flat")
-    changes = _changes(study)
-    vary = source.get("variation", len(study.seeds) > 1 or asked is not None)
-    found = {}
-    if isinstance(own, Mapping):
-        place = f"{where}: scenario"
-        found[study.title] = _case(study.title, dict(own), place, changes, where, vary=vary)
-    places = {} if found else {own: f"{where}: scenario"}
-    for factor in study.factors:
-        if factor.name == SCENARIO_FACTOR:
-            places |= dict.fromkeys(map(str, factor.values), f"{where}: factors.scenario")
-    if asked is not None:
-        places |= dict.fromkeys(asked.training.cases, f"{where}: optimise.training.scenarios")
-        places |= dict.fromkeys(asked.held_out.cases, f"{where}: optimise.held_out.scenarios")
-    for name, place in places.items():
-        what, fix = "two scenarios of one name", "give the study another title"
-        require(name not in found, name, "different names", place, what=what, fix=fix)
-        table, file = _read(folder / name, name, place)
-        found[name] = _case(name, table, file, changes, where, vary=vary)
-    return found
+    own, asked = study.source.get("scenario", "walk_flat"), study.optimise
+    inline = {study.title: dict(own)} if isinstance(own, Mapping) else {}
+    varied = [factor.values for factor in study.factors if factor.name == SCENARIO_FACTOR]
+    names = [*(inline or [own]), *(str(value) for values in varied for value in values)]
+    names += [*asked.training.cases, *asked.held_out.cases] if asked is not None else []
+    return {name: _case(name, inline.get(name), study, folder) for name in dict.fromkeys(names)}
+
+
+def _case(name: str, table: dict[str, Any] | None, study: Study, folder: Path) -> Case:
+    """Makes a case from its tables, or those of a file beside the study or of a bundled scenario.
+
+    Raises StudyError.
+    """
+    changes, beside = _changes(study), folder / name
+    try:
+        if table is None:
+            table, place = read_tables(beside if os.path.isfile(beside) else name)
+        else:
+            place = "scenario"
+        table = with_values(table, changes)
+        scenario = scenario_from_table(table, where=place, given=list(changes))
+        check_scenario(scenario)
+    except HexapodError as error:
+        raise placed(error, f"{study.where}: {error.where or name}") from error
+    several = len(study.seeds) > 1 or study.optimise is not None
+    if study.source.get("variation", several) and "variation" not in table:
+        table["variation"] = asdict(STANDARD)
+    table["outputs"] = {"plots": False}  # a study keeps no recordings
+    return Case(name=name, table=table, where=place)
 
 
 def _changes(study: Study) -> dict[str, Any]:
@@ -203,47 +211,3 @@ def _changes(study: Study) -> dict[str, Any]:
         require(name not in varied, name, expected, place, what=what, fix=fix)
         changes[name] = value
     return changes
-
-
-def _case(
-    name: str,
-    table: dict[str, Any],
-    place: str,
-    changes: Mapping[str, Any],
-    where: str,
-    *,
-    vary: bool,
-) -> Case:
-    """Makes a case. Raises ScenarioError for its scenario, StudyError for a change.
-
-    Args:
-        table: the tables of the scenario.
-        place: where they come from.
-        changes: the settings of [set] by name.
-        vary: whether the standard variation is added.
-    """
-    scenario = scenario_from_table(table, where=place)
-    check_scenario(scenario, names=list(scenario.parameters))
-    try:
-        table = with_values(table, changes)
-        scenario = scenario_from_table(table, where=place, given=list(changes))
-        check_scenario(scenario, names=list(changes))
-    except HexapodError as error:
-        raise placed(error, f"{where}: set") from error
-    if vary and "variation" not in table:
-        table["variation"] = asdict(STANDARD)
-    table["outputs"] = {"plots": False}  # a study keeps no recordings
-    return Case(name=name, table=table, where=place)
-
-
-def _read(beside: Path, name: str, where: str) -> tuple[dict[str, Any], str]:
-    """Reads a scenario's tables and its place, from a file beside the study if there is one.
-
-    Raises HexapodError; for an unknown name it cites the place in the study file.
-    """
-    try:
-        return read_tables(beside if os.path.isfile(beside) else name)
-    except HexapodError as error:
-        if error.where:
-            raise
-        raise placed(error, where) from error
