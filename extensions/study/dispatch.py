@@ -117,11 +117,8 @@ def _connect(address: str) -> Any:
             raise ValueError
         return Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
-        expected, fix = "tcp://HOST:8786 of a Dask scheduler", "start one with `dask scheduler`"
-        what = "no scheduler answers"
-        raise StudyError(
-            what, got=address, expected=expected, fix=fix, where="--scheduler"
-        ) from error
+        what, expected = "no scheduler answers", "tcp://HOST:8786 of `dask scheduler`"
+        raise StudyError(what, got=address, expected=expected, where="--scheduler") from error
 
 
 @dataclass

@@ -21,6 +21,7 @@ from hexapod_cosim.extensions.study.summary import POINT_METRICS, SUMMARY, Mean,
 
 SHOWN_POINTS = 100  # rows of the table of points
 PARTS = {"training": "training", "held_out": "held out"}
+ENDINGS = {COMPLETED: "fell"}  # how a run ended that did not walk to its end
 
 
 @dataclass(frozen=True)
@@ -61,15 +62,10 @@ def overall_table(results: Results) -> Table:
 def failure_table(results: Results) -> Table:
     """Returns a row for each reason for which runs did not walk to their end."""
     rows = [
-        [str(count), control, ending(status), reason]
+        [str(count), control, ENDINGS.get(status, status), reason]
         for (control, status, reason), count in results.failures.items()
     ]
     return Table(["runs", "control", "how", "reason"], rows, left=("control", "how", "reason"))
-
-
-def ending(status: str) -> str:
-    """Returns the word for how a run ended that did not walk to its end."""
-    return "fell" if status == COMPLETED else status
 
 
 def point_table(results: Results) -> Table:
@@ -207,7 +203,7 @@ def notes(results: Results) -> Iterator[str]:
             alike = "all" if count == total else f"{count} of them"
             yield (
                 f"none of {total} {control} runs walked to its end; "
-                f"{alike} {ending(status)}: {reason}"
+                f"{alike} {ENDINGS.get(status, status)}: {reason}"
             )
         elif walked and not results.figured[control]:
             yield f"All {walked} {control} walks are {TOO_SHORT}"
