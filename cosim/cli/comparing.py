@@ -230,9 +230,7 @@ def _compare_many(works: Sequence[Work], names: Sequence[str], path: Path, *, as
         lost = lost or bool(done.comparison.losses)
     files = terrains.write_terrains(rows, path) if rows else []
     if as_json:
-        show_json(
-            {"rows": terrains.rows_as_table(rows), "reports": [str(report) for report in reports]}
-        )
+        show_json({"rows": rows, "reports": [str(report) for report in reports]})
         return FELL if lost else SUCCESS
     columns = terrains.table_columns(rows)
     show_table(list(columns), zip(*columns.values(), strict=True), right=range(2, len(columns)))

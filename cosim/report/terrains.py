@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -19,115 +17,89 @@ from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.common.files import atomic_text
 from hexapod_cosim.cosim.report.figures import Figures, figure_files, write_figures
 from hexapod_cosim.cosim.results.side_by_side import Comparisons
-from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.results.summary import Summary, finite_mean
 
 TABLE, FIGURE = "terrains.csv", "terrains"
 LARGEST, SMALLER = 7.0, 0.75  # size of the first control's mark, and share of each next one's
 ROOM = 1.06  # of an axis over its largest value
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """A column of the table."""
+class Quantity(NamedTuple):
+    """A column of the table, a mean over the runs that walked to the end."""
 
-    name: str
     unit: str
     digits: int
     title: str
 
 
-QUANTITIES = (
-    Quantity("walked", "%", 0, "walked to the end"),
-    Quantity("slip", "mm/m", 0, "slip of all feet"),
-    Quantity("peak", "BW", 2, "largest foot force"),
-    Quantity("tilt", "deg", 2, "tilt, RMS"),
-    Quantity("path", "mm/m", 0, "path error"),
-)
-
-
-@dataclass(frozen=True)
-class Row:
-    """Figures of one control in one scenario: means over its runs that walked to the end."""
-
-    scenario: str
-    control: str
-    runs: int
-    walked: int
-    values: Mapping[str, float]  # by the quantity's name; NaN where no run walked
-    reason: str  # why the first run ended that did not walk; "" where all walked
+QUANTITIES = {
+    "slip": Quantity("mm/m", 0, "slip of all feet"),
+    "peak": Quantity("BW", 2, "largest foot force"),
+    "tilt": Quantity("deg", 2, "tilt, RMS"),
+    "path": Quantity("mm/m", 0, "path error"),
+}
+WALKED = Quantity("%", 0, "walked to the end")
+Row = dict[str, Any]  # scenario, control, runs, walked, a value by QUANTITIES (NaN: none), reason
 
 
 def terrain_rows(name: str, comparison: Comparisons) -> list[Row]:
-    """Returns the rows of a scenario, one for each control."""
+    """Returns the rows of a scenario, one for each control, as for JSON."""
     return [_row(name, label, runs) for label, runs in comparison.runs.items()]
 
 
 def _row(name: str, control: str, runs: tuple[Summary, ...]) -> Row:
     walked = [run.metrics for run in runs if run.success]
-    lost = [run for run in runs if not run.success]
-    reason = next((run.failure for run in lost), "")
-    values = {
-        "walked": 100.0 * len(walked) / len(runs),
-        "slip": 1e3 * _mean([run["slip_per_metre"] for run in walked]),
-        "peak": _mean([run["peak_force"] for run in walked]),
-        "tilt": math.degrees(
-            _mean([math.hypot(run["roll_rms"], run["pitch_rms"]) for run in walked])
-        ),
-        "path": 1e3 * _mean([run["path_error"] for run in walked]),
+    tilts = [math.hypot(run["roll_rms"], run["pitch_rms"]) for run in walked]
+    return {
+        "scenario": name,
+        "control": control,
+        "runs": len(runs),
+        "walked": len(walked),
+        "slip": 1e3 * finite_mean([run["slip_per_metre"] for run in walked]),
+        "peak": finite_mean([run["peak_force"] for run in walked]),
+        "tilt": math.degrees(finite_mean(tilts)),
+        "path": 1e3 * finite_mean([run["path_error"] for run in walked]),
+        "reason": next((run.failure for run in runs if not run.success), ""),
     }
-    return Row(name, control, len(runs), len(walked), values, reason)
-
-
-def _mean(values: list[float]) -> float:
-    """Returns the mean of the finite values, NaN without any."""
-    finite = [value for value in values if math.isfinite(value)]
-    return float(np.mean(finite)) if finite else math.nan
 
 
 def table_columns(rows: list[Row]) -> dict[str, list[str]]:
     """Returns the table as texts, column by column."""
-    columns: dict[str, list[str]] = {
-        "scenario": [row.scenario for row in rows],
-        "control": [row.control for row in rows],
-        "walked": [f"{row.walked} of {row.runs}" for row in rows],
-    }
-    for quantity in QUANTITIES[1:]:
-        texts = [_text(row.values[quantity.name], quantity.digits) for row in rows]
-        columns[f"{quantity.name}, {quantity.unit}"] = texts
+    columns = {key: [row[key] for row in rows] for key in ("scenario", "control")}
+    columns["walked"] = [f"{row['walked']} of {row['runs']}" for row in rows]
+    for name, (unit, digits, _) in QUANTITIES.items():
+        columns[f"{name}, {unit}"] = [_text(row[name], f".{digits}f") or "-" for row in rows]
     return columns
 
 
-def _text(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else "-"
+def _text(value: Any, digits: str) -> str:
+    """Returns a number as text, "" for NaN; other values as they are."""
+    if not isinstance(value, float):
+        return str(value)
+    return f"{value:{digits}}" if math.isfinite(value) else ""
 
 
 def write_terrains(rows: list[Row], folder: Path) -> list[Path]:
     """Writes the table as CSV and the figure as PNG and SVG; returns the files."""
-    files = [folder / TABLE]
-    table = rows_as_table(rows)
-    with atomic_text(files[0]) as file:
-        writer = csv.DictWriter(file, table[0], lineterminator="\n")
+    with atomic_text(folder / TABLE) as file:
+        writer = csv.DictWriter(file, rows[0], lineterminator="\n")
         writer.writeheader()
-        for row in table:
-            writer.writerow({name: _cell(value) for name, value in row.items()})
+        writer.writerows({key: _text(value, ".6g") for key, value in row.items()} for row in rows)
     with matplotlib.rc_context(SETTINGS):
         images = {f"{FIGURE}.{kind}": image for kind, image in figure_files(draw_terrains(rows))}
-    return files + write_figures(Figures(images, {}), folder)
-
-
-def _cell(value: Any) -> Any:
-    if not isinstance(value, float):
-        return value
-    return f"{value:.6g}" if math.isfinite(value) else ""
+    return [folder / TABLE, *write_figures(Figures(images, {}), folder)]
 
 
 def draw_terrains(rows: list[Row]) -> Figure:
     """Draws a panel per quantity, a line per scenario, a mark per control."""
-    scenarios = list(dict.fromkeys(row.scenario for row in rows))
+    scenarios = list(dict.fromkeys(row["scenario"] for row in rows))
     figure = Figure(figsize=(WIDTH, 0.9 + 0.3 * len(scenarios)))
-    axes = figure.subplots(1, len(QUANTITIES), sharey=True)
-    for axis, quantity in zip(axes, QUANTITIES, strict=True):
-        _draw_quantity(axis, quantity, rows, scenarios)
+    shares = [100.0 * row["walked"] / row["runs"] for row in rows]
+    panels = [(WALKED, shares)]
+    panels += [(quantity, [row[name] for row in rows]) for name, quantity in QUANTITIES.items()]
+    axes = figure.subplots(1, len(panels), sharey=True)
+    for axis, (quantity, values) in zip(axes, panels, strict=True):
+        _draw_quantity(axis, quantity, [row["control"] for row in rows], values)
     axes[0].set_yticks(range(len(scenarios)), scenarios)
     axes[0].invert_yaxis()
     handles, labels = axes[0].get_legend_handles_labels()
@@ -135,45 +107,27 @@ def draw_terrains(rows: list[Row]) -> Figure:
     return figure
 
 
-def _draw_quantity(axis: Axes, quantity: Quantity, rows: list[Row], scenarios: list[str]) -> None:
+def _draw_quantity(
+    axis: Axes, quantity: Quantity, controls: list[str], values: list[float]
+) -> None:
     """Draws one panel: all controls of a scenario on one line, joined by a bar."""
-    by_control: dict[str, list[float]] = {}
-    for row in rows:
-        by_control.setdefault(row.control, []).append(row.values[quantity.name])
-    styles = control_styles(by_control)
-    table = np.array(list(by_control.values()))
-    axis.hlines(range(len(scenarios)), *_ends(table), color="0.8", linewidth=2.2, zorder=1)
-    for number, (control, values) in enumerate(by_control.items()):
-        size = LARGEST * SMALLER**number  # marks of equal values stay visible
-        mark: dict[str, Any] = {
-            "marker": styles[control].marker,
-            "markersize": size,
-            "linestyle": "none",
-        }
-        places = list(range(len(scenarios)))
-        axis.plot(values, places, color=styles[control].light, label=control, clip_on=False, **mark)
+    styles = control_styles(controls)
+    table = np.array(values).reshape(-1, len(styles)).T  # (controls, scenarios)
+    places = list(range(table.shape[1]))
+    axis.hlines(places, table.min(0), table.max(0), color="0.8", linewidth=2.2, zorder=1)
+    for number, (style, row) in enumerate(zip(styles.values(), table, strict=True)):
+        axis.plot(
+            row,
+            places,
+            color=style.light,
+            label=list(styles)[number],
+            marker=style.marker,
+            markersize=LARGEST * SMALLER**number,  # marks of equal values stay visible
+            linestyle="none",
+            clip_on=False,
+        )
     axis.set_title(quantity.title, fontsize="small")
     axis.set_xlabel(quantity.unit)
-    most = 100.0 if quantity.unit == "%" else float(np.nanmax(table, initial=0.0))
+    most = 100.0 if quantity is WALKED else float(np.nanmax(table, initial=0.0))
     axis.set_xlim(0.0, ROOM * (most or 1.0))
     axis.grid(visible=True, axis="x")
-
-
-def _ends(table: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[Any, Any]:
-    """Returns the least and the largest of all controls' values, NaN where one is missing."""
-    return table.min(axis=0), table.max(axis=0)
-
-
-def rows_as_table(rows: list[Row]) -> list[dict[str, Any]]:
-    """Returns the rows for JSON."""
-    return [
-        {
-            "scenario": row.scenario,
-            "control": row.control,
-            "runs": row.runs,
-            "walked": row.walked,
-            **{quantity.name: row.values[quantity.name] for quantity in QUANTITIES[1:]},
-            "reason": row.reason,
-        }
-        for row in rows
-    ]

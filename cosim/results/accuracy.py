@@ -20,10 +20,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
-import numpy as np
-
 from hexapod_cosim.cosim.master.loop import COMPLETED
-from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.results.summary import Summary, finite_mean
 from hexapod_cosim.cosim.scenario.checks import check_steps
 from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -148,14 +146,9 @@ def _mean_differences(pairs: Sequence[tuple[Summary, Summary]]) -> dict[str, flo
     """Returns, by metric, the mean of first minus second over the pairs that both have it."""
     names = [name for name in pairs[0][0].metrics if name not in TIMED]
     return {
-        name: _mean([first.metrics[name] - second.metrics[name] for first, second in pairs])
+        name: finite_mean([first.metrics[name] - second.metrics[name] for first, second in pairs])
         for name in names
     }
-
-
-def _mean(values: Sequence[float]) -> float:
-    known = [value for value in values if math.isfinite(value)]
-    return float(np.mean(known)) if known else math.nan
 
 
 def _notes(where: str, runs: Sequence[Summary], others: Sequence[Summary]) -> list[str]:

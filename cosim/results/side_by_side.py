@@ -15,7 +15,6 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import tomlkit
 
 from hexapod_cosim.cosim.common.files import PARTS, RUN_FILE, atomic_text, write_json, write_text
@@ -23,7 +22,13 @@ from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs, judged_pairs
 from hexapod_cosim.cosim.results.folder import METRICS_FILE, SCENARIO
 from hexapod_cosim.cosim.results.metric_table import METRICS
-from hexapod_cosim.cosim.results.summary import Summary, Unbalanced, described_losses
+from hexapod_cosim.cosim.results.summary import (
+    UNBALANCED,
+    Summary,
+    balance_warnings,
+    described_losses,
+    finite_mean,
+)
 from hexapod_cosim.cosim.scenario.controls import AT, reference_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError
@@ -87,7 +92,7 @@ class Comparisons:
     def means(self) -> dict[str, dict[str, float]]:
         """Mean of each metric, by control and metric."""
         return {
-            label: {name: _mean([run.metrics[name] for run in runs]) for name in METRICS}
+            label: {name: finite_mean([run.metrics[name] for run in runs]) for name in METRICS}
             for label, runs in self.judged.items()
         }
 
@@ -99,13 +104,13 @@ class Comparisons:
     @property
     def unbalanced(self) -> list[str]:
         """Warns, in one line per control, of runs whose energy balance does not close."""
-        return [
-            text
-            for label, runs in self.runs.items()
-            for text in Unbalanced.among([run.metrics["energy_residual"] for run in runs]).warnings(
-                label, runs=len(runs)
-            )
-        ]
+        found = []
+        for label, runs in self.runs.items():
+            residuals = [run.metrics["energy_residual"] for run in runs]
+            above = [value for value in residuals if value > UNBALANCED]
+            largest = max(above, default=0.0)
+            found += balance_warnings(label, len(above), largest, runs=len(runs))
+        return found
 
     @property
     def warnings(self) -> list[str]:
@@ -170,12 +175,6 @@ def write_comparison(
     facts = {"kind": "compare", "status": COMPLETED, "title": scenario.title, "command": command}
     write_json(folder / RUN_FILE, {**facts, PARTS: list(labels), WALKS: list(walks)})
     return [folder / name for name in (SCENARIO, METRICS_FILE, RUN_FILE)]
-
-
-def _mean(values: Sequence[float]) -> float:
-    """Returns the mean of the finite values, NaN without any."""
-    finite = np.array(values)[np.isfinite(values)]
-    return float(finite.mean()) if len(finite) else float("nan")
 
 
 def write_seeds(path: Path, runs: Sequence[Summary]) -> None:

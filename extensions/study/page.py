@@ -13,6 +13,7 @@ from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.report.page import embedded, render
 from hexapod_cosim.cosim.results.comparison import METHOD
 from hexapod_cosim.cosim.results.metric_table import METRICS
+from hexapod_cosim.cosim.results.summary import balance_warnings
 from hexapod_cosim.extensions.study import tables
 from hexapod_cosim.extensions.study.figures import drawings, save
 from hexapod_cosim.extensions.study.records import SOBOL, Study
@@ -88,8 +89,9 @@ def notes(results: Results) -> list[str]:
     """Returns the notes as sentences."""
     found = [*_of_design(results.study), *_of_missing_runs(results)]
     found += [*_without_walks(results), *_of_walks(results)]
-    for control, unbalanced in results.unbalanced.items():
-        found += unbalanced.warnings(control, runs=results.overall.runs[control])
+    for control, (count, largest) in results.unbalanced.items():
+        runs = results.overall.runs[control]
+        found += balance_warnings(control, count, largest, runs=runs)
     return found
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from hexapod_cosim.cosim.common.files import RUN_FILE, read_json, write_json
 from hexapod_cosim.cosim.results.metric_table import OF_THE_RUN
-from hexapod_cosim.cosim.results.summary import UNBALANCED, Unbalanced
+from hexapod_cosim.cosim.results.summary import UNBALANCED
 from hexapod_cosim.extensions.study.folder import MANIFEST
 from hexapod_cosim.extensions.study.groups import LAST, Figures, Point, Runs, points_of
 from hexapod_cosim.extensions.study.reading import study_from_table
@@ -41,7 +41,7 @@ class Results:
     failures: Mapping[tuple[str, str, str], int]
     # numbers of walks, and of walks with any metric, by scenario and control
     walks: Mapping[tuple[str, str], tuple[int, int]]
-    unbalanced: Mapping[str, Unbalanced]  # by control
+    unbalanced: Mapping[str, tuple[int, float]]  # number of runs and largest residual, by control
     trials: list[Trial]  # of an optimiser
     optimum: Mapping[str, Any] | None
     wall: float  # s    sum of the elapsed times of all runs
@@ -127,14 +127,14 @@ def _walks(store: Store) -> dict[tuple[str, str], tuple[int, int]]:
     return {(case, control): (walks, figured) for case, control, walks, figured in rows}
 
 
-def _unbalanced(store: Store) -> dict[str, Unbalanced]:
+def _unbalanced(store: Store) -> dict[str, tuple[int, float]]:
     """Returns the runs whose energy balance does not close, by control."""
     rows = store.select(
         "SELECT control, count(*), max(energy_residual) FROM runs WHERE energy_residual > ?"
         " GROUP BY control ORDER BY control",
         (UNBALANCED,),
     )
-    return {control: Unbalanced(count, largest) for control, count, largest in rows}
+    return {control: (count, largest) for control, count, largest in rows}
 
 
 def summary_of(results: Results) -> dict[str, Any]:
