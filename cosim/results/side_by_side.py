@@ -195,27 +195,18 @@ def _cell(value: Any) -> Any:
 
 def read_seeds(path: Path) -> dict[str, list[Summary]]:
     """Reads the runs of seeds.csv, by control. Raises HexapodError for a damaged file."""
-    fix = "run `hexapod compare` again"
     runs: dict[str, list[Summary]] = {}
     try:
         with path.open(encoding="utf-8", newline="") as file:
             for row in csv.DictReader(file):
                 runs.setdefault(row["control"], []).append(_summary(row))
-    except OSError as error:
+    except (OSError, KeyError, TypeError, ValueError, csv.Error) as error:
+        missing = error.strerror if isinstance(error, OSError) else ""
         raise HexapodError(
-            "no runs by seed",
-            got=error.strerror,
-            expected=f"{SEEDS} of a comparison",
-            fix=fix,
-            where=str(path),
-        ) from error
-    except (KeyError, TypeError, ValueError, csv.Error) as error:
-        expected = "a line per run, with all metrics"
-        raise HexapodError(
-            "damaged file",
-            got=f"{type(error).__name__}: {error}",
-            expected=expected,
-            fix=fix,
+            "no runs by seed" if missing else "damaged file",
+            got=missing or f"{type(error).__name__}: {error}",
+            expected=f"{SEEDS} of a comparison, with a line per run and all metrics",
+            fix="run `hexapod compare` again",
             where=str(path),
         ) from error
     return runs
