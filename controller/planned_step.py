@@ -12,7 +12,7 @@ import numpy as np
 from hexapod_cosim.controller.comply.compliant import Compliant
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.comply.sway import Sway
-from hexapod_cosim.controller.parts import Parts
+from hexapod_cosim.controller.gains import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis
 from hexapod_cosim.controller.walk.foot_paths import PlannedFeet
 from hexapod_cosim.controller.walk.gait_clock import GaitClock
@@ -66,20 +66,6 @@ class StepPlanner:
         self.legs, self.laws = legs, laws
         self.sway = None if laws is None else Sway(laws.dynamics, legs, active=parts.sway)
 
-    def _lower(self, feet: PlannedFeet, plane: Plane, clock: GaitClock) -> tuple[Array, Array]:
-        """Returns the activations of the legs (6,) and the lowering of their feet (6,) [m].
-
-        plane: (6,) of the feet from the torso [m].
-        """
-        if self.laws is None:
-            return np.ones(LEGS), np.zeros(LEGS)
-        support = self.laws.support
-        activation = support.activation(
-            feet.phase, clock.stayed, clock.stays, walking=clock.walking
-        )
-        activation = np.where(clock.awaited, 0.0, activation)
-        return activation, support.lowering(plane, activation)
-
     def _stand(
         self, value: Array, posture: Posture, feet: PlannedFeet, torso: complex, clock: GaitClock
     ) -> PlannedStep:
@@ -88,10 +74,11 @@ class StepPlanner:
         torso: its way in the walking frame [m].
         """
         plane = feet.plane - torso
-        activation, lowering = self._lower(feet, plane, clock)
+        activation, lowering, masses = np.ones(LEGS), np.zeros(LEGS), None
+        if self.laws is not None:
+            activation, lowering = self.laws.lowered(feet.phase, plane, clock)
         height = feet.height - lowering
         shift, pose = place_legs(self.legs, posture, plane, height, feet.rolled)
-        masses = None
         if self.laws is not None:
             way = feet.way + cis(feet.turn) * torso
             masses = self.laws.dynamics.place(pose, way, feet.turn, posture)
@@ -117,15 +104,16 @@ class StepPlanner:
         clock: of the gait, in the section of the step.
         """
         torso, sway, laws = 0j, self.sway, self.laws
-        if laws is not None and sway is not None and sway.acts(laws.adaptation):
-            guess = sway.guess(feet, laws.adaptation)
+        if laws is not None and sway is not None and sway.acts(laws.adaptation.narrowing):
+            guess = sway.guess(feet, laws.adaptation.laden())
             masses = self._stand(value, posture, feet, guess, clock).masses
             assert masses is not None
-            torso = sway.of(guess, masses, laws.adaptation)
+            part, laden = laws.adaptation.narrowing, laws.adaptation.laden()
+            torso = part * sway.of(guess, masses, laden)
         return self._stand(value, posture, feet, torso, clock)
 
     def laden(self) -> float:
         """Returns the weight that moves with the torso over the modelled one [1] (C53)."""
         assert self.sway is not None
         assert self.laws is not None
-        return self.sway.laden(self.laws.adaptation)
+        return self.laws.adaptation.laden() if self.sway.active else 1.0

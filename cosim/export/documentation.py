@@ -7,10 +7,11 @@ import re
 from collections.abc import Iterable, Sequence
 from xml.etree import ElementTree
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
+from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.interface.arrays import arrays
-from hexapod_cosim.cosim.interface.plant import CAUSALITIES, Interface, Pattern, Variable
+from hexapod_cosim.cosim.interface.records import CAUSALITIES, Interface, Pattern, Variable
 
 INTERFACES = {"CoSimulation": "co-simulation", "ModelExchange": "model exchange"}
 # explanations of the names in the tables, for scalars (False) and arrays (True)
@@ -40,7 +41,9 @@ def render_html(interface: Interface, description: str, *, picture: str, referen
     """
     root = ElementTree.fromstring(description.encode())
     environment = Environment(
-        loader=PackageLoader("hexapod_cosim.cosim.export", "pages"),
+        loader=ChoiceLoader(
+            [PackageLoader(one, "pages") for one in (PLANT.package, interface.component.package)]
+        ),
         autoescape=True,
         undefined=StrictUndefined,
     )

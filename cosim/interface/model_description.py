@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from hexapod_cosim.cosim.common.components import Component
 from hexapod_cosim.cosim.common.plant_files import DISTRIBUTION, FMI3_SOURCES, source_files
-from hexapod_cosim.cosim.interface.plant import Enumeration, Interface, Unit, Variable
+from hexapod_cosim.cosim.interface.records import Enumeration, Interface, Unit, Variable
 
 # capabilities, each tested by tests/fmi/test_fmi.py or in tests/exchange
 BOTH = {

@@ -24,7 +24,7 @@ from hexapod_cosim.cosim.interface.model_description import (
     stated,
     typed_attributes,
 )
-from hexapod_cosim.cosim.interface.plant import Enumeration, Interface, Unit
+from hexapod_cosim.cosim.interface.records import Enumeration, Interface, Unit
 
 # capabilities, each tested by tests/fmi/test_fmi3.py
 CAPABILITIES = {

@@ -46,7 +46,7 @@ def comparison_rows(comparison: Comparisons, *, net_slip: bool = False) -> Rows:
     """
     rows = metric_rows(comparison.means, net_slip=net_slip)
     for row in rows:
-        changes = [_shown_change(pair.changes[row["name"]]) for pair in comparison.pairs]
+        changes = [shown_change(pair.changes[row["name"]]) for pair in comparison.pairs]
         row |= {**changes[0], "changes": changes}
     count, walked = len(comparison.seeds), comparison.walked
     if count == 1:
@@ -66,7 +66,8 @@ def comparison_rows(comparison: Comparisons, *, net_slip: bool = False) -> Rows:
     return [first, *rows]
 
 
-def _shown_change(change: Change) -> dict[str, str]:
+def shown_change(change: Change) -> dict[str, str]:
+    """Returns a change, its interval and its verdict as texts, "" where there is none."""
     return {"change": _change(change), "interval": _interval(change), "verdict": change.verdict}
 
 

@@ -48,6 +48,9 @@ class Locomotion:
     missed: str = ""  # how it missed the end of its commanded path; "" when it arrived
 
 
+PYTHON, COMPILED = ENGINES = ("python", "compiled")  # loop and controller of a run
+
+
 @dataclass(frozen=True, kw_only=True)
 class RunFacts:
     """The content of run.json."""
@@ -56,6 +59,7 @@ class RunFacts:
     reason: str  # a sentence; "" when completed
     title: str
     control: str  # label
+    engine: str  # of ENGINES
     simulated: float  # s
     wall: float  # s
     realtime_factor: float  # simulated over wall time

@@ -23,7 +23,6 @@ from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs, jud
 from hexapod_cosim.cosim.results.folder import METRICS_FILE, SCENARIO
 from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.cosim.results.summary import (
-    UNBALANCED,
     Summary,
     balance_warnings,
     described_losses,
@@ -104,13 +103,13 @@ class Comparisons:
     @property
     def unbalanced(self) -> list[str]:
         """Warns, in one line per control, of runs whose energy balance does not close."""
-        found = []
-        for label, runs in self.runs.items():
-            residuals = [run.metrics["energy_residual"] for run in runs]
-            above = [value for value in residuals if value > UNBALANCED]
-            largest = max(above, default=0.0)
-            found += balance_warnings(label, len(above), largest, runs=len(runs))
-        return found
+        return [
+            text
+            for label, runs in self.runs.items()
+            for text in balance_warnings(
+                label, [run.metrics["energy_residual"] for run in runs], runs=len(runs)
+            )
+        ]
 
     @property
     def warnings(self) -> list[str]:

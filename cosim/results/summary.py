@@ -93,16 +93,17 @@ def finite_mean(values: Sequence[float]) -> float:
     return float(np.mean(finite)) if finite else math.nan
 
 
-def balance_warnings(control: str, count: int, largest: float, *, runs: int) -> list[str]:
+def balance_warnings(control: str, residuals: Sequence[float], *, runs: int) -> list[str]:
     """Warns of runs whose energy residual is larger than UNBALANCED.
 
     Args:
         control: of the runs.
-        count, largest: number of such runs, and their largest residual over the motors' work.
+        residuals: over the motors' work; NaN for runs without metrics.
         runs: number of runs under the control.
     """
+    above = [value for value in residuals if value > UNBALANCED]
     text = (
-        f"{control}: the energy balance of {count} of {runs} runs misses more than "
-        f"{100.0 * UNBALANCED:g} %, at most {100.0 * largest:.3g} %: {FIX}"
+        f"{control}: the energy balance of {len(above)} of {runs} runs misses more than "
+        f"{100.0 * UNBALANCED:g} %, at most {100.0 * max(above, default=0.0):.3g} %: {FIX}"
     )
-    return [text] if count else []
+    return [text] if above else []

@@ -98,7 +98,7 @@ def select_gait(
     robot = _with_servo(bare, own.servo, own.gravity)
     settings = dict(scenario.settings.get("gait", {}))
     plain = GaitSelection(robot=robot, gait=make_gait(robot, **settings), stance=OWN)
-    if scenario.walk.stance != CHOSEN:
+    if scenario.stance != CHOSEN:
         if scenario.names_walk:
             return _named(scenario, plain, bare)
         control = control_of(scenario.control)
@@ -138,7 +138,7 @@ def _of_fmu(plain: GaitSelection, path: Path) -> GaitSelection:
 
 def _named(scenario: Scenario, plain: GaitSelection, bare: Robot) -> GaitSelection:
     """Returns the walk with the stance that the scenario names; `bare` is the robot file's."""
-    stance = scenario.walk.stance
+    stance = scenario.stance
     if stance is None or stance == OWN:
         return plain
     if isinstance(stance, str):

@@ -12,8 +12,7 @@ from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.common.plant_files import binary, fmi2_platform
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant import export_fmu
-from hexapod_cosim.cosim.interface.plant import plant_roots
-from hexapod_cosim.cosim.interface.start_values import parameter_values
+from hexapod_cosim.cosim.interface.plant import parameter_values, plant_roots
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.results.ground import is_on_surface, surface_of_grid
 from hexapod_cosim.cosim.run.plan import RunPlan

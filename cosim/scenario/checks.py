@@ -65,16 +65,16 @@ def check_interval(scenario: Scenario) -> None:
 
 
 def check_servo_faults(scenario: Scenario, robot: Robot) -> None:
-    """Refuses dead servos of kinematic drives, which move by prescribed angles without torques.
+    """Refuses faults of kinematic drives, which move by prescribed angles without torques.
 
     Raises ScenarioError.
     """
-    dead = [event for event in scenario.servo_faults if event.fault == "dead"]
-    if dead and robot.servo.mode == "kinematic":
+    faults = scenario.servo_faults
+    if faults and robot.servo.mode == "kinematic":
         raise ScenarioError(
-            "a dead servo of a kinematic drive",
-            got=f"{dead[0].leg}.{dead[0].joint} dead at {dead[0].time:g} s",
-            expected="servo.mode torque, or the fault stuck",
+            "a fault of a servo of a kinematic drive",
+            got=f"{faults[0].leg}.{faults[0].joint} {faults[0].fault} at {faults[0].time:g} s",
+            expected="servo.mode torque or position",
             fix="set servo.mode=torque",
             where=f"{scenario.where}: events",
         )

@@ -9,6 +9,7 @@ from typing import Any
 from hexapod_cosim.cosim.scenario.records import (
     ANGLE,
     ATTITUDE,
+    WHOLE_LEG,
     AngleFault,
     AttitudeFault,
     Event,
@@ -33,14 +34,18 @@ SENSOR_TEXTS = {
     "stuck": "repeats its last reading",
     "nan": "reads NaN",
     "late": "is late by {delay:g} ms",
+    "noisy": "has a noise of {noise:g} %",
 }
 LOST_TEXTS = {
     "command": "the joint commands are lost, and the last one holds",
     "step": "macro-steps are dropped: the last readings and joint commands hold",
 }
 SERVO_TEXTS = {
-    "dead": "is dead: it follows the joint without torque",
-    "stuck": "is stuck: it holds the angle of that moment",
+    "weak": "gives {share:g} of its torque",
+    "limp": "is limp",
+    "locked": "is locked",
+    "dead": "is limp",
+    "stuck": "is locked",
 }
 
 
@@ -114,7 +119,10 @@ def describe_event(event: Event) -> str:
         case AttitudeFault():
             text = f"the attitude sensor {_reading(event)}"
         case ServoFault():
-            text = f"the servo of {event.leg}.{event.joint} {SERVO_TEXTS[event.fault]}"
+            which = f"servo of {event.leg}.{event.joint}"
+            if event.joint == WHOLE_LEG:
+                which = f"leg {event.leg}"
+            text = f"the {which} {SERVO_TEXTS[event.fault].format(share=event.share)}"
         case Lost():
             text = LOST_TEXTS[event.lost]
     return text if math.isinf(event.duration) else f"{text}, for {event.duration:g} s"
@@ -124,7 +132,8 @@ def _reading(event: SensorFault) -> str:
     """Returns what a faulty sensor reads."""
     if isinstance(event, AttitudeFault) and event.fault == "dead":
         return "reads level and at rest"
-    return SENSOR_TEXTS[event.fault].format(delay=1000.0 * event.delay)
+    noise = 100.0 * event.noise if isinstance(event, Fault) else 0.0
+    return SENSOR_TEXTS[event.fault].format(delay=1000.0 * event.delay, noise=noise)
 
 
 def _vector(values: tuple[float, ...]) -> str:

@@ -39,7 +39,7 @@ from hexapod_cosim.cosim.scenario.sections import (
     read_commands,
     read_gravity,
     read_setting,
-    read_walk,
+    read_stance,
 )
 from hexapod_cosim.cosim.scenario.tables import read_tables, with_overrides
 from hexapod_cosim.models import Robot, ScenarioError, load_robot
@@ -92,7 +92,7 @@ def scenario_from_table(
             commands=read_commands(table.get("command", {}), "command"),
             events=read_events(table.get("events", [])),
             sensors=read_record(Sensors, table.get("sensors", {}), "sensors"),
-            walk=read_walk(table.get("walk", {}), "walk"),
+            stance=read_stance(table.get("walk", {}), "walk"),
             compliance=read_record(Parts, table.get("compliance", {}), "compliance"),
             variation=read_record(Variation, table["variation"], "variation")
             if "variation" in table

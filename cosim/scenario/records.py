@@ -27,8 +27,11 @@ from hexapod_cosim.models.schema import Choice, Flag, Number, Text, Texts, Vecto
 CONTROLS = ("kinematic", "paper", "compliant")
 COMPARED = ("kinematic", "compliant")  # unless a command or a study names its controls
 FAULTS = ("dead", "stuck", "nan", "late")  # of sensors
+NOISY = "noisy"  # a further one of force sensors
 ANGLE, ATTITUDE = "angle", "attitude"  # sensors inside the robot
-SERVO_FAULTS = ("dead", "stuck")
+# of servos; dead and stuck are older names of limp and locked
+SERVO_FAULTS = ("weak", "limp", "locked", "dead", "stuck")
+WHOLE_LEG = "all"  # joints
 LOST = ("command", "step")
 DELAY = Number("s", at_least=0.0, at_most=1.0)  # of late readings
 FORMATS = ("parquet", "csv", "mcap")  # of recordings
@@ -81,13 +84,14 @@ class Fault:
 
     A dead sensor reads zero, a stuck one repeats its last reading, and nan is no number. A late one
     reads what it should have read `delay` earlier, rounded up to whole macro-steps, or else at the
-    start of the run.
+    start of the run. A noisy one has this noise: a standard deviation, as a share of the force.
     """
 
     time: Annotated[float, Number("s", at_least=0.0)]
     leg: Annotated[str, Choice(LEG_NAMES)]
-    fault: Annotated[str, Choice(FAULTS)]
+    fault: Annotated[str, Choice((*FAULTS, NOISY))]
     delay: Annotated[float, DELAY] = 0.0
+    noise: Annotated[float, Number("1", at_least=0.0)] = 0.1
     duration: Annotated[float, Number("s", above=0.0)] = math.inf
 
 
@@ -123,14 +127,15 @@ class AttitudeFault:
 class ServoFault:
     """A fault of a joint's servo from `time` [s from the start of the run].
 
-    A dead servo follows the joint: its command is the measured angle and speed, without torque. A
-    stuck one holds the angle that was measured when the fault began.
+    A weak servo gives a share of its largest torque, a limp one none; a locked joint stays at the
+    angle that it has when the fault begins (the plant's inputs `strength` and `lock`).
     """
 
     time: Annotated[float, Number("s", at_least=0.0)]
     leg: Annotated[str, Choice(LEG_NAMES)]
-    joint: Annotated[str, Choice(JOINT_NAMES)]
+    joint: Annotated[str, Choice((*JOINT_NAMES, WHOLE_LEG))]
     fault: Annotated[str, Choice(SERVO_FAULTS)]
+    share: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.5  # of a weak one
     duration: Annotated[float, Number("s", above=0.0)] = math.inf
 
 
@@ -185,16 +190,6 @@ STANCE_CHANGE = Vector("m", 2)
 WALK_KEYS = ("stance",)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Walk:
-    """The stance that a scenario names: what the walk is, besides the gait in [gait]."""
-
-    # OWN: of the robot file. DESIGNED: that of `hexapod design --stance` for the gait. CHOSEN: that
-    # which compliant control chooses, with its gait unless [gait] names one. Two lengths: by which
-    # the feet stand further out from the hips, and deeper below them [m]. None: not named
-    stance: str | tuple[float, float] | None = None
-
-
 def default_formats() -> tuple[str, ...]:
     """Returns the formats of recordings: CSV, and Parquet if the extra `parquet` is installed."""
     return ("parquet", "csv") if has_pyarrow() else ("csv",)
@@ -227,7 +222,10 @@ class Scenario:
     macro_step: Annotated[float, Number("s", above=0.0, at_most=0.1)] = DEFAULT_PERIOD
     seed: Annotated[int, Whole()] = 0
     gravity: tuple[float, float, float] | None = None  # m/s2    None: the robot's own
-    walk: Walk = Walk()
+    # OWN: of the robot file. DESIGNED: that of least heat for the gait. CHOSEN: that of compliant
+    # control, with its gait unless [gait] names one. Two lengths: by which the feet stand further
+    # out from the hips, and deeper below them [m]. None: not named
+    stance: str | tuple[float, float] | None = None  # key of [walk]
     settings: Mapping[str, Mapping[str, Any]]  # differences from the robot file, by section
     commands: tuple[Command, ...]  # in order of time
     events: tuple[Event, ...] = ()
@@ -252,7 +250,7 @@ class Scenario:
     def names_walk(self) -> bool:
         """Whether the scenario names a gait, its timing or a stance; else the control chooses."""
         timing = {"name", "period", "duty"} & set(self.settings.get("gait", {}))
-        return bool(timing) or self.walk.stance is not None
+        return bool(timing) or self.stance is not None
 
     @property
     def pushes(self) -> tuple[Push, ...]:
@@ -290,8 +288,8 @@ class Scenario:
         plain = {key: getattr(self, key) for key in names if key in ("control", *PLAIN_KEYS)}
         plain |= {} if self.gravity is None else {"gravity": list(self.gravity)}
         tables = {key: dict(value) for key, value in self.settings.items() if value}
-        if self.walk.stance is not None:
-            named = self.walk.stance
+        if self.stance is not None:
+            named = self.stance
             tables["walk"] = {"stance": named if isinstance(named, str) else list(named)}
         if self.control_settings:  # a table, which stands behind the plain keys
             tables["control"] = {"law": plain.pop("control"), **self.control_settings}
@@ -318,13 +316,16 @@ SECTIONS = (
 KEYS = (*PLAIN_KEYS, "gravity", "events", *SECTIONS)
 
 
+UNUSED_SETTINGS = (("delay", 0.0), ("noise", 0.1), ("share", 0.5))
+
+
 def _as_table(record: Any) -> dict[str, Any]:
-    """Returns the fields of a record, without an infinite duration and a delay of 0, which files
-    omit.
+    """Returns the fields of a record, without an infinite duration and unused settings of faults,
+    which files omit.
     """
     table = {item.name: getattr(record, item.name) for item in fields(record)}
     return {
         key: value
         for key, value in table.items()
-        if value != math.inf and (key, value) != ("delay", 0.0)
+        if value != math.inf and (key, value) not in UNUSED_SETTINGS
     }

@@ -18,7 +18,6 @@ from hexapod_cosim.cosim.scenario.records import (
     UNUSED,
     WALK_KEYS,
     Command,
-    Walk,
 )
 from hexapod_cosim.models import RobotError, ScenarioError
 from hexapod_cosim.models.ground.table import read_keys
@@ -62,14 +61,14 @@ def read_setting(name: str, table: Any, where: str) -> dict[str, Any]:
     return read_given(record, table, where)
 
 
-def read_walk(table: Any, where: str) -> Walk:
+def read_stance(table: Any, where: str) -> str | tuple[float, float] | None:
     """Reads [walk]: the stance by its name, or as two lengths."""
     refuse_unknown_keys(expect_table(table, where), list(WALK_KEYS), where)
     value, key = table.get("stance"), f"{where}.stance"
     if isinstance(value, list | tuple):
         outward, deeper = STANCE_CHANGE.read(value, key)
-        return Walk(stance=(outward, deeper))
-    return Walk(stance=None if value is None else Choice(STANCES).read(value, key))
+        return outward, deeper
+    return None if value is None else Choice(STANCES).read(value, key)
 
 
 def read_commands(value: Any, where: str) -> tuple[Command, ...]:

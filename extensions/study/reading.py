@@ -24,7 +24,7 @@ from hexapod_cosim.extensions.study.checks import (
     placed,
 )
 from hexapod_cosim.extensions.study.extension import list_studies
-from hexapod_cosim.extensions.study.factors import plain_name, read_factors, read_optimise
+from hexapod_cosim.extensions.study.factors import read_factors, read_optimise
 from hexapod_cosim.extensions.study.records import (
     DESIGNS,
     DRAWN,
@@ -88,7 +88,6 @@ def study_from_table(
         folder: folder of the file, which paths of scenario files are relative to.
         scenarios: the scenarios by name, when no file shall be read and nothing be checked again.
     """
-    rules.check_plain(table, where)
     what, fix = "not a key of an optimisation", "leave it out: [optimise] says what is run"
     for key in OF_A_SWEEP if "optimise" in table else ():
         require(key not in table, key, "[optimise] alone", where, what=what, fix=fix)
@@ -101,11 +100,10 @@ def study_from_table(
         title=read["title"] or Path(where).stem,
         cases={},
         factors=factors,
-        design=read["design"][0],
+        design=read["design"],
         points=read["points"] or 1,
         seeds=read["seeds"],
-        controls=tuple(control.label for control in controls),
-        texts={control.label: control.text for control in controls},
+        laws=controls,
         seed=read["seed"],
         optimise=optimise,
         source=dict(table),
@@ -131,11 +129,9 @@ def _controls(read: Mapping[str, Any], folder: Path, where: str) -> tuple[Contro
 def _check_points(points: int | None, study: Study) -> None:
     """Checks that drawn designs have a number of points, and only they."""
     drawn, place = study.design in DRAWN, f"{study.where}: points"
-    has = points is not None
-    require(has or not drawn, None, "a number of points", place, fix="write points = 100")
-    what = "a number of points for a design that has its own"
-    fix = f'leave it out, or write design = "{DRAWN[-1]}" (or {", ".join(DRAWN[:-1])})'
-    require(drawn or not has, points, "no points", place, what=what, fix=fix)
+    expected = f"a number of points for the designs {', '.join(DRAWN)} alone"
+    fix = "write points = 100" if drawn else "leave it out"
+    require((points is not None) == drawn, points, expected, place, fix=fix)
 
 
 STUDY: Rules = {
@@ -146,12 +142,12 @@ STUDY: Rules = {
     ),
     "set": (rules.table, {}),
     "seed": (rules.whole(0, 2**32 - 1), 0),  # that all random number generators accept
-    "variation": (rules.optional(rules.boolean), None),
-    "optimise": (rules.optional(read_optimise), None),
-    "factors": (read_factors, {}),
-    "design": (rules.names(DESIGNS), GRID),
-    "points": (rules.optional(rules.whole(1, 10**7)), None),
-    "seeds": (rules.seeds(10**7), 1),
+    "variation": (rules.boolean, None),
+    "optimise": (read_optimise, None),
+    "factors": (read_factors, ()),
+    "design": (rules.name_of(DESIGNS), GRID),
+    "points": (rules.whole(1, 10**7), None),
+    "seeds": (rules.seeds(10**7), range(1)),
     "controls": (rules.texts('controls = ["kinematic", "law.py:Class"]'), list(COMPARED)),
 }
 
@@ -161,15 +157,21 @@ def _cases(study: Study, folder: Path) -> dict[str, Case]:
 
     They are the study's own one, those of the factor `scenario` and those of an optimisation.
     """
-    source, where = study.source, study.where
+    source, where, asked = study.source, study.where, study.optimise
     own = source.get("scenario", "walk_flat")
     changes = _changes(study)
-    vary = source.get("variation", len(study.seeds) > 1 or study.optimise is not None)
+    vary = source.get("variation", len(study.seeds) > 1 or asked is not None)
     found = {}
     if isinstance(own, Mapping):
         place = f"{where}: scenario"
         found[study.title] = _case(study.title, dict(own), place, changes, where, vary=vary)
-    places = ({} if found else {own: f"{where}: scenario"}) | _scenario_places(study)
+    places = {} if found else {own: f"{where}: scenario"}
+    for factor in study.factors:
+        if factor.name == SCENARIO_FACTOR:
+            places |= dict.fromkeys(map(str, factor.values), f"{where}: factors.scenario")
+    if asked is not None:
+        places |= dict.fromkeys(asked.training.cases, f"{where}: optimise.training.scenarios")
+        places |= dict.fromkeys(asked.held_out.cases, f"{where}: optimise.held_out.scenarios")
     for name, place in places.items():
         what, fix = "two scenarios of one name", "give the study another title"
         require(name not in found, name, "different names", place, what=what, fix=fix)
@@ -178,39 +180,20 @@ def _cases(study: Study, folder: Path) -> dict[str, Case]:
     return found
 
 
-def _scenario_places(study: Study) -> dict[str, str]:
-    """Returns the keys of the study file that name scenarios beside `scenario`, by scenario."""
-    where, asked = study.where, study.optimise
-    values = [
-        value
-        for factor in study.factors
-        if factor.name == SCENARIO_FACTOR
-        for value in factor.values
-    ]
-    places = {str(value): f"{where}: factors.scenario" for value in values}
-    if asked is not None:
-        places |= dict.fromkeys(asked.training.cases, f"{where}: optimise.training.scenarios")
-        places |= dict.fromkeys(asked.held_out.cases, f"{where}: optimise.held_out.scenarios")
-    return places
-
-
 def _changes(study: Study) -> dict[str, Any]:
     """Returns the settings of [set] by name.
 
     A setting that is a factor as well is refused. For a variable of an optimiser it is allowed: it
     is the value before the optimisation.
     """
-    where = f"{study.where}: set"
     changes: dict[str, Any] = {}
-    factors = {factor.name for factor in study.factors}
+    varied = [] if study.optimise else [factor.name for factor in study.factors]
     what, fix = "set and varied", "take one of them away: the factor would replace it"
-    for name, value in rules.leaves(study.source.get("set", {})):
-        rules.require_once(name, name in changes, f"{where}.{name}")
+    for name, value, place in rules.named_once(study.source.get("set", {}), f"{study.where}: set"):
+        check_settable(name, place)
+        expected = "each name in [set] or [factors]"
+        require(name not in varied, name, expected, place, what=what, fix=fix)
         changes[name] = value
-        check_settable(plain_name(name), f"{where}.{name}", kind="setting")
-        twice = study.optimise is None and plain_name(name) in factors
-        expected, place = "each name in [set] or [factors]", f"{where}.{name}"
-        require(not twice, name, expected, place, what=what, fix=fix)
     return changes
 
 
@@ -236,10 +219,9 @@ def _case(
     try:
         table = with_values(table, changes)
         scenario = scenario_from_table(table, where=place, given=list(changes))
-        check_scenario(scenario, names=[plain_name(name) for name in changes])
+        check_scenario(scenario, names=list(changes))
     except HexapodError as error:
-        key = (error.where or "").rpartition(": ")[2].removeprefix("--set ")
-        raise placed(error, f"{where}: set.{plain_name(key)}") from error
+        raise placed(error, f"{where}: set") from error
     if vary and "variation" not in table:
         table["variation"] = asdict(STANDARD)
     table["outputs"] = {"plots": False}  # a study keeps no recordings

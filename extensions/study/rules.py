@@ -1,7 +1,7 @@
 """Rules for the values of a study file: each reads a value or raises StudyError.
 
 A table of a file is read by a table of rules, from keys to a rule and a default. A rule is called
-with None for a missing key without a default, and refuses it as missing.
+with None for a missing key that is REQUIRED, and refuses it as missing.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ from hexapod_cosim.models import unknown_name
 Rule = Callable[[Any, str], Any]  # from a value and its place to what it means
 Rules = Mapping[str, tuple[Rule, Any]]
 
-LARGEST = 2**63 - 1  # integer of TOML and of a column
-MAX_LENGTH = 1000  # characters of a text
+REQUIRED = object()  # in place of a default
+LARGEST = 2**63 - 1  # integer of a column
+PARAMETERS = "parameters."  # an optional prefix of names
 
 
 def require(
@@ -42,17 +43,16 @@ def require_known(names: Iterable[str], known: Iterable[str], where: str, kind: 
             raise unknown_name(kind, name, list(known), where=where, error=StudyError)
 
 
-def place_of(where: str, key: str) -> str:
-    """Returns the place of a key in a table at a place, as in "study.toml: optimise.metric"."""
-    return f"{where}{'.' if ': ' in where else ': '}{key}"
-
-
 def read_table(value: Any, rules: Rules, where: str) -> dict[str, Any]:
-    """Returns the values of a table by its rules, with their defaults."""
+    """Returns the values of a table by its rules, with their defaults.
+
+    `where`: the file, or the file and the key of the table.
+    """
     table(value, where)
     require_known(value, rules, where, "key")
+    before = f"{where}." if ": " in where else f"{where}: "
     return {
-        key: rule(value.get(key, default), place_of(where, key))
+        key: rule(value.get(key), before + key) if key in value or default is REQUIRED else default
         for key, (rule, default) in rules.items()
     }
 
@@ -72,11 +72,6 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _different_texts(value: Any) -> bool:
-    listed = isinstance(value, list) and all(isinstance(item, str) for item in value)
-    return listed and 0 < len(value) == len(set(value))
-
-
 text = simple(lambda value: isinstance(value, str), "a text in quotes")
 boolean = simple(lambda value: isinstance(value, bool), "true or false", "leave the quotes out")
 table = simple(lambda value: isinstance(value, Mapping), "a table", "write it as [section]")
@@ -84,32 +79,34 @@ table = simple(lambda value: isinstance(value, Mapping), "a table", "write it as
 
 def texts(example: str) -> Rule:
     """Returns the rule of a list of one or more different texts."""
-    return simple(_different_texts, "a list of different texts", f"write {example}")
+    return simple(
+        lambda value: (
+            isinstance(value, list)
+            and all(isinstance(item, str) for item in value)
+            and 0 < len(value) == len(set(value))
+        ),
+        "a list of different texts",
+        f"write {example}",
+    )
 
 
 def whole(least: int, most: int) -> Rule:
     """Returns the rule of a whole number within bounds."""
     return simple(
-        lambda value: is_number(value) and isinstance(value, int) and least <= value <= most,
+        lambda value: type(value) is int and least <= value <= most,
         f"a whole number >= {least} and <= {most}",
     )
 
 
-def names(known: Sequence[str]) -> Rule:
-    """Returns the rule of one name, or of a list of different ones, among `known`."""
+def name_of(known: Sequence[str]) -> Rule:
+    """Returns the rule of one of the names `known`."""
 
-    def read(value: Any, where: str) -> tuple[str, ...]:
-        listed = [value] if isinstance(value, str) else value
-        texts(f"some of {', '.join(known)}")(listed, where)
-        require_known(listed, known, where, "name")
-        return tuple(listed)
+    def read(value: Any, where: str) -> str:
+        require(isinstance(value, str), value, f"one of {', '.join(known)}", where)
+        require_known([value], known, where, "name")
+        return str(value)
 
     return read
-
-
-def optional(rule: Rule) -> Rule:
-    """Returns the rule of a key that may be missing."""
-    return lambda value, where: None if value is None else rule(value, where)
 
 
 def seeds(most: int) -> Rule:
@@ -129,24 +126,6 @@ def seeds(most: int) -> Rule:
     return read
 
 
-def check_plain(value: Any, where: str) -> None:
-    """Checks that JSON and a column can represent a value and all values in it."""
-    if isinstance(value, Mapping):
-        for key, item in value.items():
-            check_plain(item, place_of(where, key))
-    elif isinstance(value, list):
-        for number, item in enumerate(value):
-            check_plain(item, f"{where}[{number}]")
-    elif isinstance(value, int):
-        require(abs(value) <= LARGEST, value, "a whole number within 64 bits", where)
-    elif isinstance(value, float):
-        require(math.isfinite(value), value, "a finite number", where)
-    else:
-        plain = isinstance(value, str) and len(value) <= MAX_LENGTH and value.isprintable()
-        expected = f"a number, true, false or a printable text of at most {MAX_LENGTH} characters"
-        require(plain, value, expected, where, what="value not allowed")
-
-
 def _is_table(_key: str, value: Any) -> bool:
     return isinstance(value, Mapping)
 
@@ -162,6 +141,15 @@ def leaves(
             yield f"{before}{key}", value
 
 
-def require_once(name: str, again: bool, where: str) -> None:
-    """Checks that a name is not there already."""
-    require(not again, name, "each name once", where, what="given twice", fix="take one away")
+def named_once(nested: Any, where: str, is_section: Callable[[str, Any], bool] = _is_table) -> Any:
+    """Yields name, value and place of the leaves of a table, without "parameters." in the names.
+
+    Raises StudyError for a name that is given twice; columns of SQL ignore the case of letters.
+    """
+    found: set[str] = set()
+    for full, value in leaves(nested, is_section=is_section):
+        name, place = full.removeprefix(PARAMETERS), f"{where}.{full}"
+        once = name.lower() not in found
+        require(once, name, "each name once", place, what="given twice", fix="take one away")
+        found.add(name.lower())
+        yield name, value, place

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -11,8 +10,7 @@ import typer
 
 from hexapod_cosim.cosim.cli.failures import FELL
 from hexapod_cosim.cosim.cli.options import ControlNames, FmuFile, GainsFile, Json
-from hexapod_cosim.cosim.cli.running import given_gains
-from hexapod_cosim.cosim.cli.terminal import warn
+from hexapod_cosim.cosim.cli.running import Words, given_gains
 from hexapod_cosim.cosim.common.installation import require_pyarrow
 
 EPILOG = (
@@ -69,15 +67,14 @@ def study(
     """
     require_pyarrow("studies", "hexapod study")
     # imported here: it is slow, and no other command needs it
-    from hexapod_cosim.extensions.study.study import Options, run_and_report  # noqa: PLC0415
+    from hexapod_cosim.extensions.study.run import Options, run_and_report  # noqa: PLC0415
 
     options = Options(
         fmu=fmu,
         gains=given_gains(gains),
         workers=workers,
         scheduler=scheduler,
-        events=warn,
-        command=_command_line(file, control=control, fmu=fmu, gains=gains),
+        command=Words(control, [], fmu=fmu, gains=gains).command("study", file),
     )
     folder = output or Path("out") / Path(file).stem
     return run_and_report(file, folder, options, controls=control or [], json=json)
@@ -86,17 +83,6 @@ def study(
 def report_again(folder: Path) -> Sequence[Path]:
     """Writes the tables and the report of a study's folder again; returns the files."""
     require_pyarrow("studies", "hexapod report")
-    from hexapod_cosim.extensions.study.study import report_on, warn_of  # noqa: PLC0415  slow
+    from hexapod_cosim.extensions.study.run import report_on  # noqa: PLC0415  slow
 
-    found, files = report_on(folder)
-    warn_of(found)
-    return files
-
-
-def _command_line(file: str, **options: object) -> str:
-    """Returns the command line that repeats the study, with the options that were given."""
-    words = ["hexapod", "study", file]
-    for name, value in options.items():
-        for item in value if isinstance(value, list) else [value]:
-            words += [] if item is None else [f"--{name}", str(item)]
-    return shlex.join(words)
+    return report_on(folder)[1]

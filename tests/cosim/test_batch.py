@@ -74,7 +74,7 @@ def test_a_run_that_fails_or_cannot_begin_says_why_and_the_others_go_on(plant_bu
         short(),
         short("command.vx=10"),
         short("robot=nowhere.toml"),
-        short("solver.method=rk4", "solver.step=0.005", endless),
+        short("solver.method=dp54", "solver.step=0.002", endless),
         short(),
     ]
     runs = list(run_batch(plans, workers=2))

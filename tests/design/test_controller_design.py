@@ -32,7 +32,7 @@ from hexapod_cosim.controller.design.paper import (
     scaled,
     shifted,
 )
-from hexapod_cosim.controller.parts import Parts
+from hexapod_cosim.controller.gains import Parts
 from hexapod_cosim.cosim.design.gains import design_for, read_requirements, standing_plants
 from hexapod_cosim.models import load_robot
 

@@ -92,11 +92,11 @@ def moments(robot: Robot, body: Array, damping: Array) -> Array:
 
 @pytest.mark.parametrize("seed", [2, 5])
 def test_losses_of_a_step_are_those_of_the_readable_equations(core: ct.CDLL, seed: int) -> None:
-    robot = everything("tanh", seed, solver={"method": "bs32", "step": H})
+    robot = everything("tanh", seed, solver={"method": "dp54", "step": H})
     command, pose = random_command(robot, seed), random_pose(robot, seed)
     plant, there = (Plant(core, robot, **pose) for _ in range(2))
     before, damping = plant.bodies, standing_damping(robot, plant.bodies)
-    m, rate = coefficients(core, "bs32"), rates(core, there, command)
+    m, rate = coefficients(core, "dp54"), rates(core, there, command)
     k, sums = np.zeros((7, 247)), [np.zeros((6, 3)) for _ in range(5)]
     for i in range(m.stages):
         y = before.ravel() + H * m.a[i] @ k

@@ -58,7 +58,7 @@ def test_a_step_s_measures_are_those_of_the_readable_equations(
 ) -> None:
     robot = changed(
         lopsided(seed),
-        solver={"method": "bs32", "step": H},
+        solver={"method": "dp54", "step": H},
         terrain=terrain,
         servo={"torque_max": 3.0, "speed_max": 8.0},
     )
@@ -66,7 +66,7 @@ def test_a_step_s_measures_are_those_of_the_readable_equations(
     command = random_command(robot, seed)
     plant, there = (Plant(core, robot, **random_pose(robot, seed)) for _ in range(2))
     before, damping = plant.bodies, standing_damping(robot, plant.bodies)
-    m, rate = coefficients(core, "bs32"), rates(core, there, command)
+    m, rate = coefficients(core, "dp54"), rates(core, there, command)
     k, sums = np.zeros((7, 247)), [np.zeros((6, 3)) for _ in range(3)]
     for i in range(m.stages):
         y = before.ravel() + H * m.a[i] @ k
@@ -134,7 +134,7 @@ def test_the_rise_of_a_landing_is_that_of_the_readable_equations(
     """
     settings = {"law": "exact_restitution", "restitution": restitution}
     robot = changed(
-        load_robot("athena"), contact=settings, solver={"method": "bs32", "step": 2.3e-4}
+        load_robot("athena"), contact=settings, solver={"method": "dp54", "step": 2.3e-4}
     )
     plant = Plant(
         core,

@@ -35,7 +35,7 @@ class Tableau:
 
 
 def coefficients(core: ct.CDLL, method: str) -> Tableau:
-    shape, gamma = (ct.c_int * 3)(), ct.c_double()
+    shape, gamma = (ct.c_int * 2)(), ct.c_double()
     a, g, c, b, e = np.zeros((7, 7)), np.zeros((7, 7)), np.zeros(7), np.zeros(7), np.zeros(7)
     core.hx_probe_method(
         METHODS.index(method) + 1, shape, ct.byref(gamma), *map(pointer, (a, g, c, b, e))

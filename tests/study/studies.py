@@ -15,8 +15,8 @@ from hexapod_cosim.extensions.study.folder import RESULTS
 from hexapod_cosim.extensions.study.job import Job, make_job
 from hexapod_cosim.extensions.study.reading import study_from_table
 from hexapod_cosim.extensions.study.records import Study
+from hexapod_cosim.extensions.study.run import Options, run_study
 from hexapod_cosim.extensions.study.store import RUNS, Store, quoted
-from hexapod_cosim.extensions.study.study import Options, run_study
 
 SMALL: dict[str, Any] = {
     "scenario": "walk_flat",
@@ -88,4 +88,4 @@ def use_runner(monkeypatch: pytest.MonkeyPatch, runner: type) -> None:
     def make(*arguments: Any, **options: Any) -> Job:
         return make_job(*arguments, **{**options, "runner": runner})
 
-    monkeypatch.setattr("hexapod_cosim.extensions.study.study.make_job", make)
+    monkeypatch.setattr("hexapod_cosim.extensions.study.run.make_job", make)

@@ -6,7 +6,6 @@ import signal
 import subprocess
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from studies import KINEMATIC, Row, quiet, rows, run_quietly, study_of
 from study_runners import Slow
 
 from hexapod_cosim.extensions.study.records import StudyError
-from hexapod_cosim.extensions.study.study import Options, run_study
+from hexapod_cosim.extensions.study.run import Options, run_study
 
 TABLE: dict[str, Any] = {**KINEMATIC, "seeds": 40, "factors": {"friction.mu": [0.3, 0.5]}}
 
@@ -30,17 +29,15 @@ def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 @pytest.fixture
-def study_on(athena_fmu: Path, tmp_path: Path, scheduler: str) -> Callable[..., list[str]]:
+def study_on(athena_fmu: Path, tmp_path: Path, scheduler: str) -> Callable[..., None]:
     """A function that runs the study on the cluster into tmp_path/out.
 
-    It calls its argument once, when the first results are there, and returns the events.
+    It calls its argument once, when the first results are there.
     """
 
-    def run(after_the_first: Callable[[], object], address: str = scheduler) -> list[str]:
-        events: list[str] = []
-        options = Options(runner=Slow, fmu=athena_fmu, scheduler=address, events=events.append)
+    def run(after_the_first: Callable[[], object], address: str = scheduler) -> None:
+        options = Options(runner=Slow, fmu=athena_fmu, scheduler=address)
         run_study(study_of(TABLE), tmp_path / "out", options=options, start=once(after_the_first))
-        return events
 
     return run
 
@@ -63,19 +60,6 @@ def test_a_killed_worker_costs_no_run(
 ) -> None:
     with mortal_workers(scheduler, 2, tmp_path) as workers:
         study_on(lambda: kill(workers[0]))
-    assert rows(tmp_path / "out") == alone
-
-
-def test_workers_that_join_when_all_are_gone_get_the_job_and_continue(
-    study_on: Callable[..., Any], scheduler: str, alone: list[Row], tmp_path: Path
-) -> None:
-    with ExitStack() as opened, mortal_workers(scheduler, 1, tmp_path) as workers:
-
-        def replace() -> None:
-            kill(workers[0])
-            opened.enter_context(mortal_workers(scheduler, 1, tmp_path))
-
-        study_on(replace)
     assert rows(tmp_path / "out") == alone
 
 

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from hexapod_cosim.controller import DEFAULT_PERIOD
 from hexapod_cosim.cosim.export.documentation import Row, variable_rows
 from hexapod_cosim.cosim.interface.controller import load_controller_interface
-from hexapod_cosim.cosim.interface.plant import Interface, load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.models import load_robot
 

@@ -1,5 +1,5 @@
-/* controller.c - joint commands from body command and measurement, once per
- * period. Python: controller/controller.py. */
+/* controller.c - joint commands from body command and measurement, once per period. Python:
+ * controller/controller.py. */
 #include "state.h"
 
 #include <string.h>
@@ -13,8 +13,7 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
   hx_fade_compile(definition->period, &model->fade);
 }
 
-/* ----------------------------------------------------------------- change of
- * gait and control */
+/* ----------------------------------------------------------------- change of gait and control */
 
 void hx_controller_adopt(hxControllerModel model[2], hxControllerState *state) {
   hxControllerModel *next = &model[1 - state->model];
@@ -43,8 +42,7 @@ void hx_controller_exchange(hxControllerModel *model, const hxFootPathsModel *be
   memset(output->fallback, 0, sizeof output->fallback);
 }
 
-/* -------------------------------------------------------------------------------------
- * joints */
+/* ------------------------------------------------------------------------------------- joints */
 
 /* Computes joint commands that move the feet along their paths (C10 to C14). */
 static void follow_paths(const hxControllerModel *model, hxControllerState *state) {
@@ -69,8 +67,7 @@ static void follow_paths(const hxControllerModel *model, hxControllerState *stat
   }
 }
 
-/* Corrects the paths by the deviations of the feet, and the commands with them
- * (C49). */
+/* Corrects the paths by the deviations of the feet, and the commands with them (C49). */
 static void correct_paths(const hxControllerModel *model, const hxControllerInput *input,
                           hxControllerState *state) {
   const hxLegSolver *leg = model->plan.planner.leg;
@@ -105,8 +102,7 @@ static void correct_paths(const hxControllerModel *model, const hxControllerInpu
   }
 }
 
-/* Fills the planned loads and the geometry of the present step for the laws
- * (C15 to C20). */
+/* Fills the planned loads and the geometry of the present step for the laws (C15 to C20). */
 static void present_step(const hxControllerModel *model, hxControllerState *state,
                          hxPresentStep *present) {
   const hxStepPlanner *planner = &model->plan.planner;
@@ -118,8 +114,8 @@ static void present_step(const hxControllerModel *model, hxControllerState *stat
   double height[HX_LEGS];
   hxDemand demand;
   hx_inverse_dynamics_demand(&planner->laws.dynamics, planner->leg, &motion, output->speed_ref,
-                             &now->posture,
-                             hx_step_planner_laden(planner, &state->compliant.adaptation), &demand);
+                             &now->posture, hx_step_planner_laden(planner, &state->compliant),
+                             &demand);
   load->overspeed = 0;
   for (int k = 0; k < HX_LEGS; ++k) {
     load->feet[k] = hx_plane_add(now->plane[k], now->shift[k]);
@@ -141,8 +137,7 @@ static void present_step(const hxControllerModel *model, hxControllerState *stat
   present->rolled = now->feet.rolled;
 }
 
-/* --------------------------------------------------------------------------------------
- * ticks */
+/* -------------------------------------------------------------------------------------- ticks */
 
 void hx_controller_begin(const hxControllerModel *model, double t, hxControllerState *state) {
   const hxStepPlanner *planner = &model->plan.planner;

@@ -1,5 +1,5 @@
-/* plan.h - plans the steps of a walk: three of them, before, at and after the
- * present one. Python: controller/plan.py. */
+/* plan.h - plans the steps of a walk: three of them, before, at and after the present one. Python:
+ * controller/plan.py. */
 #ifndef HX_PLAN_H
 #define HX_PLAN_H
 
@@ -15,10 +15,9 @@ typedef struct hxWalkPlanModel {
 typedef struct hxWalkPlan {
   hxCommandRamp ramp;
   hxFootPaths paths;
-  int64_t at;                /* the present step, counted from the begin of its section */
-  int64_t last;              /* the step at which the ramp ends, where a new section begins */
-  int cut;                   /* the present step is the last of its section: a leg lifts off or
-                                touches down */
+  int64_t at;   /* the present step, counted from the begin of its section */
+  int64_t last; /* the step at which the ramp ends, where a new section begins */
+  int cut;      /* the present step is the last of its section: a leg lifts off or touches down */
   int has_before, has_after; /* the neighbours of the present step are planned */
   int present;               /* index of the present step in `step`, a ring buffer */
   hxPlannedStep step[3];
@@ -33,17 +32,15 @@ static inline void hx_walk_plan_compile(const hxControllerDefinition *definition
   if (model->planner.compliant) model->paths.clock.handover = model->planner.laws.support.handover;
 }
 
-/* Index of a planned step: -1 is the previous one, 0 the present one, 1 the
- * next one. */
+/* Index of a planned step: -1 is the previous one, 0 the present one, 1 the next one. */
 static inline hxPlannedStep *hx_walk_plan_step(hxWalkPlan *plan, int neighbour) {
   return &plan->step[(plan->present + neighbour + 3) % 3];
 }
 
-/* -------------------------------------------------------------------------------------
- * a step */
+/* ------------------------------------------------------------------------------------- a step */
 
-/* Computes the command a number of periods ahead, including the posture, and
- * returns the motion of the body. number: periods since the section began. */
+/* Computes the command a number of periods ahead, including the posture, and returns the motion of
+ * the body. number: periods since the section began. */
 static inline hxTwist look_ahead(const hxWalkPlanModel *model, const hxCompliant *laws,
                                  const hxWalkPlan *plan, int64_t ahead, int64_t number,
                                  hxPlannedStep *step) {
@@ -63,25 +60,22 @@ static inline void hx_walk_plan_reset(const hxWalkPlanModel *model, const hxComp
   plan->cut = 1;
   hx_foot_paths_reset(&model->paths, &plan->paths, &step->feet);
   look_ahead(model, laws, plan, 0, 0, step);
-  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, &laws->adaptation, step);
+  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, step);
 }
 
-/* Plans the step a number of periods after the section began. before: the step
- * before it. */
+/* Plans the step a number of periods after the section began. before: the step before it. */
 static inline void plan_step(const hxWalkPlanModel *model, const hxCompliant *laws,
                              const hxWalkPlan *plan, int64_t number, const hxPlannedStep *before,
                              hxPlannedStep *step) {
   const hxTwist twist = look_ahead(model, laws, plan, 1, number, step);
   hx_foot_paths_walk(&model->paths, &plan->paths, number, twist, &before->feet, &step->feet);
-  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, &laws->adaptation, step);
+  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, step);
 }
 
-/* -----------------------------------------------------------------------------------
- * sections */
+/* ----------------------------------------------------------------------------------- sections */
 
-/* Notes which feet have met the ground on their way down (C51), and narrows the
- * stance: the steps of a commanded motion aim at the stance that the weight
- * asks for (C53). */
+/* Notes which feet have met the ground on their way down (C51), and narrows the stance: the steps
+ * of a commanded motion aim at the stance that the weight asks for (C53). */
 static inline void follow_sensors(const hxWalkPlanModel *model, const hxCompliant *laws,
                                   hxWalkPlan *plan) {
   const hxPlannedFeet *feet = &hx_walk_plan_step(plan, 0)->feet;
@@ -92,8 +86,7 @@ static inline void follow_sensors(const hxWalkPlanModel *model, const hxComplian
   if (hx_command_ramp_moves(&plan->ramp)) paths->narrowing = laws->adaptation.narrowing;
 }
 
-/* Returns whether the gait clock waits for feet at the ends of their swings
- * (C50). */
+/* Returns whether the gait clock waits for feet at the ends of their swings (C50). */
 static inline int waits(const hxWalkPlanModel *model, const hxCompliant *laws,
                         const hxWalkPlan *plan) {
   const hxGaitClock *clock = &plan->paths.clock;
@@ -103,8 +96,8 @@ static inline int waits(const hxWalkPlanModel *model, const hxCompliant *laws,
   return hx_compliance_waits(&model->planner.laws.laws, landing, clock->held, &laws->laws);
 }
 
-/* Begins a new section at the present step, and plans the next step. waiting:
- * the gait clock stands still in it. */
+/* Begins a new section at the present step, and plans the next step. waiting: the gait clock stands
+ * still in it. */
 static inline void plan_afresh(const hxWalkPlanModel *model, int waiting, hxCompliant *laws,
                                hxWalkPlan *plan) {
   const int moves = hx_command_ramp_moves(&plan->ramp),
@@ -119,14 +112,14 @@ static inline void plan_afresh(const hxWalkPlanModel *model, int waiting, hxComp
   else
     hx_foot_paths_plan(&model->paths, &now, plan->at, moves || !settled, twist, &plan->paths,
                        &first->feet);
-  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, &laws->adaptation, first);
+  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, first);
   plan->last = moves || settled ? INT64_MAX : model->ramp.end - plan->ramp.steps;
   plan->at = 0;
   plan_step(model, laws, plan, 1, first, hx_walk_plan_step(plan, 1));
 }
 
-/* Makes the planned step the present one, and plans the step after it.
- * command_changed: the plan no longer applies, and a new section begins. */
+/* Makes the planned step the present one, and plans the step after it. command_changed: the plan no
+ * longer applies, and a new section begins. */
 static inline void hx_walk_plan_advance(const hxWalkPlanModel *model, int command_changed,
                                         hxCompliant *laws, hxWalkPlan *plan) {
   const int due = command_changed || !plan->has_after;
@@ -147,8 +140,7 @@ static inline void hx_walk_plan_advance(const hxWalkPlanModel *model, int comman
     plan_step(model, laws, plan, next, hx_walk_plan_step(plan, 0), hx_walk_plan_step(plan, 1));
 }
 
-/* ----------------------------------------------------------------- change of
- * gait and control */
+/* ----------------------------------------------------------------- change of gait and control */
 
 /* Lets the legs finish their steps and begin no other (C55). */
 static inline void hx_walk_plan_end(hxWalkPlan *plan) {
@@ -164,8 +156,8 @@ static inline int hx_walk_plan_ended(hxWalkPlan *plan) {
   return ended;
 }
 
-/* Goes on with the standing feet and the command in another gait (C55). before:
- * the model of the gait so far. */
+/* Goes on with the standing feet and the command in another gait (C55). before: the model of the
+ * gait so far. */
 static HX_SELDOM void hx_walk_plan_adopt(hxWalkPlanModel *model, const hxWalkPlanModel *before,
                                          hxWalkPlan *plan) {
   hx_command_ramp_carry(&model->ramp, &before->ramp, &plan->ramp);
@@ -176,8 +168,8 @@ static HX_SELDOM void hx_walk_plan_adopt(hxWalkPlanModel *model, const hxWalkPla
   plan->cut = 1;
 }
 
-/* Goes on in the phase of the plan under another control, in the same gait.
- * before: the paths' model under the control before. */
+/* Goes on in the phase of the plan under another control, in the same gait. before: the paths'
+ * model under the control before. */
 static HX_SELDOM void hx_walk_plan_carry(hxWalkPlanModel *model, const hxFootPathsModel *before,
                                          hxWalkPlan *plan) {
   hxGaitClockModel *clock = &model->paths.clock;
@@ -189,11 +181,9 @@ static HX_SELDOM void hx_walk_plan_carry(hxWalkPlanModel *model, const hxFootPat
   plan->cut = 1;
 }
 
-/* ---------------------------------------------------------------------------
- * the present step */
+/* --------------------------------------------------------------------------- the present step */
 
-/* Returns the rate of a quantity at the present step, one-sided at the end of a
- * section. */
+/* Returns the rate of a quantity at the present step, one-sided at the end of a section. */
 static inline double rate_of(const hxWalkPlan *plan, double before, double now, double after,
                              double period) {
   if (plan->has_after && plan->has_before) return (after - before) / (2.0 * period);
@@ -207,8 +197,7 @@ static inline hxPlane rate_of_plane(const hxWalkPlan *plan, hxPlane before, hxPl
                   rate_of(plan, before.y, now.y, after.y, period));
 }
 
-/* Computes the centre of a foot as the command plans it: on its path, rolling,
- * not lowered. */
+/* Computes the centre of a foot as the command plans it: on its path, rolling, not lowered. */
 static inline void hx_walk_plan_centre(hxWalkPlan *plan, int k, double centre[3]) {
   const hxPlannedStep *now = hx_walk_plan_step(plan, 0);
   hxPlane plane = hx_plane_add(now->plane[k], now->shift[k]);
@@ -219,8 +208,7 @@ static inline void hx_walk_plan_centre(hxWalkPlan *plan, int k, double centre[3]
   centre[2] = height;
 }
 
-/* Computes a foot of the present step with rolling and lowering, torso frame
- * [m, m/s]. */
+/* Computes a foot of the present step with rolling and lowering, torso frame [m, m/s]. */
 static inline void hx_walk_plan_foot(const hxWalkPlanModel *model, hxWalkPlan *plan, int k,
                                      hxPlane *plane, double *height, hxPlane *velocity,
                                      double *rise) {
@@ -243,8 +231,8 @@ static inline double hx_walk_plan_lift(const hxWalkPlanModel *model, hxWalkPlan 
   return hx_walk_plan_step(plan, 0)->feet.height[k] - model->paths.home_height[k];
 }
 
-/* Returns the step after (else before) the present one, NULL when there is
- * none, and its time from there in *time [s]. */
+/* Returns the step after (else before) the present one, NULL when there is none, and its time from
+ * there in *time [s]. */
 static inline const hxPlannedStep *hx_walk_plan_neighbour(const hxWalkPlanModel *model,
                                                           hxWalkPlan *plan, double *time) {
   *time = plan->has_after ? model->period : -model->period;
@@ -252,8 +240,7 @@ static inline const hxPlannedStep *hx_walk_plan_neighbour(const hxWalkPlanModel 
   return plan->has_before ? hx_walk_plan_step(plan, -1) : NULL;
 }
 
-/* Returns the masses and poses of the three steps; at the ends of sections, of
- * one alone. */
+/* Returns the masses and poses of the three steps; at the ends of sections, of one alone. */
 static inline hxNeighbours hx_walk_plan_motion(hxWalkPlan *plan) {
   const hxPlannedStep *before = hx_walk_plan_step(plan, -1), *now = hx_walk_plan_step(plan, 0),
                       *after = hx_walk_plan_step(plan, 1);

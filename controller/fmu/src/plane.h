@@ -1,5 +1,5 @@
-/* plane.h - points and directions of a plane as complex numbers x + i y, so
- * that a rotation is one product. */
+/* plane.h - points and directions of a plane as complex numbers x + i y, so that a rotation is one
+ * product. */
 #ifndef HX_PLANE_H
 #define HX_PLANE_H
 
@@ -8,8 +8,8 @@
 #include "hexapod/inside.h"
 #include "transcendental.h"
 
-/* Changes of gait and control are rare: their functions are compiled for size,
- * because wheels contain them for every platform. */
+/* Changes of gait and control are rare: their functions are compiled for size, because wheels
+ * contain them for every platform. */
 #if defined(__GNUC__)
 #define HX_SELDOM __attribute__((cold, noinline, unused))
 #else
@@ -36,8 +36,7 @@ static inline double hx_length(hxPlane a) { return sqrt(hx_square(a)); }
 /* Returns e^x for x <= 0, to 1e-16. */
 static inline double hx_decay(double x) { return 1.0 + hx_growth(x); }
 
-/* Return Re(a^* b) and Im(a^* b), the dot and the cross product of two vectors.
- */
+/* Return Re(a^* b) and Im(a^* b), the dot and the cross product of two vectors. */
 static inline double hx_along(hxPlane a, hxPlane b) { return a.x * b.x + a.y * b.y; }
 static inline double hx_across(hxPlane a, hxPlane b) { return a.x * b.y - a.y * b.x; }
 
@@ -56,8 +55,8 @@ static inline double hx_clamp(double x, double low, double high) {
   return x < low ? low : x > high ? high : x;
 }
 
-/* Return the larger and the smaller of x and a bound; the bound if x is not a
- * number. Not by fmax and fmin, which are calls. */
+/* Return the larger and the smaller of x and a bound; the bound if x is not a number. Not by fmax
+ * and fmin, which are calls. */
 static inline double hx_larger(double x, double bound) { return x > bound ? x : bound; }
 static inline double hx_smaller(double x, double bound) { return x < bound ? x : bound; }
 

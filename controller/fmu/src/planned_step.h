@@ -9,8 +9,7 @@
 #include "walk/foot_paths.h"
 #include <string.h>
 
-/* One planned step. It depends on the command alone. Feet are in the walking
- * frame. */
+/* One planned step. It depends on the command alone. Feet are in the walking frame. */
 typedef struct hxPlannedStep {
   double value[HX_COMMANDS],
       rate[HX_COMMANDS]; /* vx vy yaw_rate height roll pitch, and per second */
@@ -28,8 +27,7 @@ typedef struct hxPlannedStep {
 
 /* Constants of the plan of a step. */
 typedef struct hxStepPlanner {
-  int compliant; /* compliant control, which lowers feet; otherwise there are no
-                    laws */
+  int compliant; /* compliant control, which lowers feet; otherwise there are no laws */
   hxLegSolver leg[HX_LEGS];
   hxCompliantModel laws;
   hxSway sway;
@@ -44,26 +42,7 @@ static inline void hx_step_planner_compile(const hxControllerDefinition *definit
   hx_sway_compile(definition, model->leg, &model->laws.dynamics, &model->sway);
 }
 
-/* Computes the activations of the legs, and lowers the feet by the depth to
- * which the ground will deform under their loads. */
-static inline void lower(const hxStepPlanner *model, const hxGaitClock *clock,
-                         hxPlannedStep *step) {
-  const hxSupport *support = &model->laws.support;
-  memset(step->lowering, 0, sizeof step->lowering);
-  for (int k = 0; k < HX_LEGS; ++k) {
-    step->activation[k] = 1.0;
-    if (model->compliant)
-      step->activation[k] =
-          clock->awaited[k] ? 0.0
-                            : hx_support_activation(support, step->feet.phase[k], clock->stayed[k],
-                                                    clock->stays[k], clock->walking);
-  }
-  if (model->compliant) hx_support_lowering(support, step->plane, step->activation, step->lowering);
-  for (int k = 0; k < HX_LEGS; ++k) step->height[k] = step->feet.height[k] - step->lowering[k];
-}
-
-/* Computes the poses of legs whose contact points are shifted from the planned
- * feet. */
+/* Computes the poses of legs whose contact points are shifted from the planned feet. */
 static inline void reach_all(const hxLegSolver leg[HX_LEGS], const hxPlane shift[HX_LEGS],
                              hxPlannedStep *step) {
   hxPlane seen[HX_LEGS];
@@ -76,11 +55,10 @@ static inline void reach_all(const hxLegSolver leg[HX_LEGS], const hxPlane shift
   hx_leg_solver_poses(leg, (const hxPlane *)seen, (const double *)z, step->pose);
 }
 
-/* Computes by how far the feet's contact points shift because their spheres
- * roll (C9), and the poses of the legs. A tibia that pitches by dB rolls the
- * sphere by -R dB along the outward direction of the leg. The shift s changes B
- * itself: s = R (C + s dC/du) is solved by one Newton step. What is rolled on
- * the way to another position than that of the stance is no shift. */
+/* Computes by how far the feet's contact points shift because their spheres roll (C9), and the
+ * poses of the legs. A tibia that pitches by dB rolls the sphere by -R dB along the outward
+ * direction of the leg. The shift s changes B itself: s = R (C + s dC/du) is solved by one Newton
+ * step. What is rolled on the way to another position than that of the stance is no shift. */
 static inline void place_legs(const hxLegSolver leg[HX_LEGS], hxPlannedStep *step) {
   const hxPlane none[HX_LEGS] = {{0.0, 0.0}};
   reach_all(leg, none, step);
@@ -95,12 +73,18 @@ static inline void place_legs(const hxLegSolver leg[HX_LEGS], hxPlannedStep *ste
   reach_all(leg, (const hxPlane *)step->shift, step);
 }
 
-/* Computes the poses of the legs and the point masses for a torso that has
- * moved. */
+/* Computes the poses of the legs and the point masses for a torso that has moved. */
 static inline void stand(const hxStepPlanner *model, const hxGaitClock *clock,
                          hxPlannedStep *step) {
   for (int k = 0; k < HX_LEGS; ++k) step->plane[k] = hx_plane_sub(step->feet.plane[k], step->torso);
-  lower(model, clock, step);
+  if (model->compliant) {
+    hx_compliant_lowered(&model->laws, clock, step->feet.phase, step->plane, step->activation,
+                         step->lowering);
+  } else {
+    memset(step->lowering, 0, sizeof step->lowering);
+    for (int k = 0; k < HX_LEGS; ++k) step->activation[k] = 1.0;
+  }
+  for (int k = 0; k < HX_LEGS; ++k) step->height[k] = step->feet.height[k] - step->lowering[k];
   place_legs(model->leg, step);
   if (!model->compliant) return;
   const hxPlane turn = hx_cis(step->feet.turn);
@@ -109,26 +93,26 @@ static inline void stand(const hxStepPlanner *model, const hxGaitClock *clock,
                             &step->posture, &step->masses);
 }
 
-/* Computes way of the torso, poses of the legs and point masses for planned
- * feet. clock: of the gait, in the section of the step. */
+/* Computes way of the torso, poses of the legs and point masses for planned feet. clock: of the
+ * gait, in the section of the step. */
 static inline void hx_step_planner_lay_out(const hxStepPlanner *model, const hxGaitClock *clock,
-                                           const hxLoadAdaptation *adaptation,
-                                           hxPlannedStep *step) {
+                                           const hxCompliant *laws, hxPlannedStep *step) {
   const hxSway *sway = &model->sway;
+  const double narrowing = laws->adaptation.narrowing;
   step->torso = hx_plane(0.0, 0.0);
-  if (model->compliant && hx_sway_acts(sway, adaptation)) {
-    step->torso = hx_sway_guess(sway, &step->feet, adaptation);
+  if (model->compliant && hx_sway_acts(sway, narrowing)) {
+    const double laden = hx_load_adaptation_laden(&laws->adaptation);
+    step->torso = hx_sway_guess(sway, &step->feet, laden);
     stand(model, clock, step);
-    step->torso = hx_sway_of(sway, &model->laws.dynamics, step->torso, &step->masses, adaptation);
+    step->torso = hx_scaled(
+        hx_sway_of(sway, &model->laws.dynamics, step->torso, &step->masses, laden), narrowing);
   }
   stand(model, clock, step);
 }
 
-/* Returns the weight that moves with the torso over the modelled one [1] (C53).
- */
-static inline double hx_step_planner_laden(const hxStepPlanner *model,
-                                           const hxLoadAdaptation *adaptation) {
-  return hx_sway_laden(&model->sway, adaptation);
+/* Returns the weight that moves with the torso over the modelled one [1] (C53). */
+static inline double hx_step_planner_laden(const hxStepPlanner *model, const hxCompliant *laws) {
+  return model->sway.active ? hx_load_adaptation_laden(&laws->adaptation) : 1.0;
 }
 
 #endif

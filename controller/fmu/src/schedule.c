@@ -1,5 +1,4 @@
-/* schedule.c - the public functions of a controller: ticks at their times,
- * saved states, refusals.
+/* schedule.c - the public functions of a controller: ticks at their times, saved states, refusals.
  */
 #include <float.h>
 #include <stddef.h>
@@ -9,8 +8,7 @@
 #include "hexapod/message.h"
 #include "state.h"
 
-/* A saved state: a header that identifies it, then the controller's definition,
- * models and state.
+/* A saved state: a header that identifies it, then the controller's definition, models and state.
  */
 typedef struct {
   uint64_t magic, version, size, checksum;
@@ -21,8 +19,7 @@ typedef struct {
 
 static const uint64_t magic = 0x72746e6f43507868u; /* "hxPContr" */
 static const uint64_t saved_version = 8;
-/* 1, of a period: a tick that is later than the present time by less than this
- * is due */
+/* 1, of a period: a tick that is later than the present time by less than this is due */
 static const double clock_tolerance = 0.01;
 
 static uint64_t checksum(const hxSaved *saved) {
@@ -60,8 +57,7 @@ hxStatus hx_controller_reset(hxController *controller, const hxControllerDefinit
   char message[HX_MESSAGE_SIZE];
   if (!isfinite(t))
     return refuse(controller, HX_INVALID_ARGUMENT,
-                  "start time: got a number that is not finite, expected a "
-                  "finite time in s");
+                  "start time: got a number that is not finite, expected a finite time in s");
   const hxStatus status = hx_controller_definition_check(definition, message);
   if (status != HX_OK) return refuse(controller, status, message);
   controller->definition = *definition;
@@ -100,8 +96,7 @@ hxStatus hx_controller_change_gait(hxController *controller, const hxGait *gait)
 
 int hx_controller_control(const hxController *controller) { return controller->definition.control; }
 
-/* Compiles a model again, under the definition's control and in the model's own
- * gait. */
+/* Compiles a model again, under the definition's control and in the model's own gait. */
 static void compile_again(const hxController *controller, hxControllerModel *model) {
   hxControllerDefinition definition = controller->definition;
   definition.gait = model->gait;
@@ -154,9 +149,8 @@ static int is_finite(const hxControllerOutput *output) {
   return sum == 0.0;
 }
 
-/* Computes the state after the next tick under an input in the place of the
- * other state, unless it is there, and returns it. Inputs consist of doubles
- * only. */
+/* Computes the state after the next tick under an input in the place of the other state, unless it
+ * is there, and returns it. Inputs consist of doubles only. */
 static const hxControllerState *tick_ahead(hxController *controller,
                                            const hxControllerInput *input) {
   hxControllerState *next = &controller->state[1 - controller->now];
@@ -176,8 +170,7 @@ void hx_controller_output(hxController *controller, const hxControllerInput *inp
   *output = due ? tick_ahead(controller, input)->output : state->output;
 }
 
-/* Executes the next tick; the first one of a step leaves the state before it as
- * the other one. */
+/* Executes the next tick; the first one of a step leaves the state before it as the other one. */
 static void tick(hxController *controller, const hxControllerInput *input, int first) {
   if (first) {
     tick_ahead(controller, input);
@@ -218,9 +211,9 @@ hxStatus hx_controller_step(hxController *controller, const hxControllerInput *i
       continue;
     }
     controller->now = before;
-    return refuse(controller, HX_NOT_FINITE,
-                  "joint commands: got numbers that are not finite, expected a "
-                  "command that legs can follow");
+    return refuse(
+        controller, HX_NOT_FINITE,
+        "joint commands: got numbers that are not finite, expected a command that legs can follow");
   }
   present(controller)->time = t_end;
   return HX_OK;
@@ -245,20 +238,19 @@ hxStatus hx_controller_set_state(hxController *controller, const void *bytes, si
   hxSaved saved;
   if (size != sizeof saved) {
     hx_print(controller->message, HX_MESSAGE_SIZE,
-             "saved state: got %zu bytes, expected %zu; save it again with "
-             "this version",
-             size, sizeof saved);
+             "saved state: got %zu bytes, expected %zu; save it again with this version", size,
+             sizeof saved);
     return HX_BAD_STATE;
   }
   memcpy(&saved, bytes, sizeof saved);
   if (saved.magic != magic || saved.version != saved_version || saved.size != sizeof saved)
-    return refuse(controller, HX_BAD_STATE,
-                  "saved state: got one of another version, expected one of "
-                  "this version; save it again");
+    return refuse(
+        controller, HX_BAD_STATE,
+        "saved state: got one of another version, expected one of this version; save it again");
   if (saved.checksum != checksum(&saved))
-    return refuse(controller, HX_BAD_STATE,
-                  "saved state: got a damaged one, expected one whose checksum "
-                  "is right; save it again");
+    return refuse(
+        controller, HX_BAD_STATE,
+        "saved state: got a damaged one, expected one whose checksum is right; save it again");
   memcpy(&controller->definition, &saved.definition, sizeof saved.definition);
   memcpy(controller->model, saved.model, sizeof saved.model);
   memcpy(present(controller), &saved.state, sizeof saved.state);

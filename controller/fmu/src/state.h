@@ -1,6 +1,6 @@
-/* state.h - data of a controller: constants compiled from the definition, and
- * the state, without pointers; and its tick, from body command and measurement
- * to joint commands. Python: controller/controller.py. */
+/* state.h - data of a controller: constants compiled from the definition, and the state, without
+ * pointers; and its tick, from body command and measurement to joint commands. Python:
+ * controller/controller.py. */
 #ifndef HX_CONTROLLER_STATE_H
 #define HX_CONTROLLER_STATE_H
 
@@ -26,19 +26,17 @@ typedef struct hxControllerState {
   hxWalkPlan plan;
   hxCompliant compliant;
   hxPaper paper;
-  hxFade fade;               /* from the control before */
-  int model;                 /* index of the present model; the other one is that of the next
-                                gait */
-  int changing;              /* to the other model */
+  hxFade fade;  /* from the control before */
+  int model;    /* index of the present model; the other one is that of the next gait */
+  int changing; /* to the other model */
   hxControllerOutput output; /* of the last tick */
 } hxControllerState;
 
 struct hxController {
   hxControllerDefinition definition; /* with the gait that was asked for last */
   hxControllerModel model[2];        /* of the present gait and of the next one */
-  /* the present state, and the other one: the next tick's, computed early for
-   * its outputs, or that before a step, which one that fails restores. It is
-   * not part of the controller's state */
+  /* the present state, and the other one: the next tick's, computed early for its outputs, or that
+   * before a step, which one that fails restores. It is not part of the controller's state */
   hxControllerState state[2];
   int now;      /* index of the present state */
   int is_ahead; /* the other state is that after the next tick under `input` */
@@ -51,24 +49,22 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
 /* Resets to standing in the stance, with all states of the laws cleared. */
 void hx_controller_begin(const hxControllerModel *model, double t, hxControllerState *state);
 
-/* Continues in the gait of the other model once all legs stand and carry their
- * whole loads, when the gait is being changed (C55). The models differ in their
- * gaits only. */
+/* Continues in the gait of the other model once all legs stand and carry their whole loads, when
+ * the gait is being changed (C55). The models differ in their gaits only. */
 void hx_controller_adopt(hxControllerModel model[2], hxControllerState *state);
 
 /* Begins a change to the gait of the other model (C55). */
 void hx_controller_change(hxControllerModel model[2], hxControllerState *state);
 
-/* Goes on under another control, which the present model has been compiled for,
- * in the present phase of the walk: the plan keeps its state, the laws begin
- * anew, and the joint commands fade over from the last ones. before: the paths'
- * model of the present gait under the control before.
+/* Goes on under another control, which the present model has been compiled for, in the present
+ * phase of the walk: the plan keeps its state, the laws begin anew, and the joint commands fade
+ * over from the last ones. before: the paths' model of the present gait under the control before.
  */
 void hx_controller_exchange(hxControllerModel *model, const hxFootPathsModel *before,
                             hxControllerState *state);
 
-/* Checks the range of every number of an input. On failure message says which
- * value was got and what was expected. */
+/* Checks the range of every number of an input. On failure message says which value was got and
+ * what was expected. */
 hxStatus hx_controller_input_check(const hxControllerInput *input, char *message);
 
 /* Computes one tick; state->output then holds the commands for this input. */

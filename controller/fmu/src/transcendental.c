@@ -16,8 +16,8 @@ static inline double from_bits(int64_t bits) {
   return x;
 }
 
-/* x = k pi/2 + r with |r| <= pi/4, Taylor to r^17 and r^16 (remainders 1e-19
- * and 2e-18), then k quarter turns */
+/* x = k pi/2 + r with |r| <= pi/4, Taylor to r^17 and r^16 (remainders 1e-19 and 2e-18), then k
+ * quarter turns */
 void hx_sine_cosine(double x, double *sine, double *cosine) {
   /* pi/2 in three pieces, the first two of 33 bits: k times them is exact */
   const double high = 0x1.921fb544p+0, mid = 0x1.0b4611a6p-34, low = 0x1.3198a2e037073p-69;
@@ -41,8 +41,8 @@ void hx_sine_cosine(double x, double *sine, double *cosine) {
   *cosine = from_bits((bits_of(c) ^ differ) ^ (int64_t)((uint64_t)((quarter + 1) & 2) << 62));
 }
 
-/* The tangent t of the angle to the nearer axis or, beyond tan(pi/8), to the
- * diagonal; minimax polynomial, exact to 1.3e-18. */
+/* The tangent t of the angle to the nearer axis or, beyond tan(pi/8), to the diagonal; minimax
+ * polynomial, exact to 1.3e-18. */
 static inline double arc(double y, double x) {
   const double quarter = 1.5707963267948966, tan_eighth = 0.41421356237309503;
   const double right = fabs(x), up = fabs(y);
@@ -68,8 +68,7 @@ void hx_arcs(int n, const double y[], const double x[], double angle[]) {
   for (int i = 0; i < n; ++i) angle[i] = arc(y[i], x[i]);
 }
 
-/* e^x - 1: x = k ln 2 + r, Taylor to r^13 (remainder 4e-18), then 2^k (e^r - 1)
- * + (2^k - 1) */
+/* e^x - 1: x = k ln 2 + r, Taylor to r^13 (remainder 4e-18), then 2^k (e^r - 1) + (2^k - 1) */
 static inline double growth(double x) {
   const double ln2_high = 6.93147180369123816490e-01,
                ln2_low = 1.90821492927058770002e-10; /* ln 2 in two pieces */
@@ -97,8 +96,8 @@ void hx_saturations(int n, const double x[], double tanh_x[]) {
   }
 }
 
-/* x y with y = x^(-1/3), by Newton's method from a third of the exponent and of
- * the mantissa, 3 % off: each step squares the error and doubles it */
+/* x y with y = x^(-1/3), by Newton's method from a third of the exponent and of the mantissa, 3 %
+ * off: each step squares the error and doubles it */
 double hx_two_thirds(double x) {
   if (x < 1e-200) return 0.0;
   double y = from_bits(0x553ef0ff289dd796 - bits_of(x) / 3);

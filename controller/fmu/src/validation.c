@@ -32,8 +32,7 @@ static void relations(hxChecker *c, const hxControllerDefinition *d) {
   if (!(d->period < shorter)) hx_check_fail(c, "period", d->period, expected);
   if (d->control != HX_CONTROL_KINEMATIC && !(d->servo.kp > 0.0))
     hx_check_fail(c, "servo.kp", d->servo.kp,
-                  "more than 0 except under kinematic control: the others "
-                  "shift the servos' "
+                  "more than 0 except under kinematic control: the others shift the servos' "
                   "targets");
   legs(c, d);
 }

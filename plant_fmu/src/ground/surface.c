@@ -5,8 +5,10 @@
 #include <string.h>
 
 #include "hexapod/message.h"
-#include "one_lane.h"
 #include "soil.h"
+
+#define HX_LANES 1
+#include "../lanes/lanes.h"
 
 #include "smooth.h" /* behind the numbers that it computes with */
 

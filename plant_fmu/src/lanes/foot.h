@@ -161,25 +161,21 @@ typedef struct {
   const hxMergedFeet *merged; /* the feet's contacts in one row, pack by pack */
 } hxKnown;
 
+/* Return what is known of a pack of a row; NULL: nothing. Points of numbers with derivatives are
+ * computed one by one. */
 #ifdef HX_TANGENT
-/* Points of numbers with derivatives are computed one by one. */
 static inline hxPatchNodes *known_nodes(const hxKnown *known, int row, int slot) {
-  (void)known, (void)row, (void)slot;
-  return NULL;
-}
-static inline const hxSoilCurves *known_virgin(const hxKnown *known, int row, int slot) {
   (void)known, (void)row, (void)slot;
   return NULL;
 }
 #else
-/* Returns what is known of a pack of a row; NULL: nothing. */
 static inline hxPatchNodes *known_nodes(const hxKnown *known, int row, int slot) {
   return known && known->nodes && row < HX_FOOT_ROWS ? &known->nodes[slot / HX_LANES] : NULL;
 }
+#endif
 static inline const hxSoilCurves *known_virgin(const hxKnown *known, int row, int slot) {
   return known && known->virgin && row == HX_FOOT ? &known->virgin[slot / HX_LANES] : NULL;
 }
-#endif
 
 /* Returns distance and normal of a grid at a row's points from the moment of the same motion. */
 HX_INLINE hxGround known_ground(const hxModel *model, const hxMoment *moment, int row, int slot) {

@@ -208,8 +208,6 @@ static inline hxStepEnd end_step(const hxModel *model, const hxPlantMotion *from
   switch (m->stages) {
   case 2:
     return step_of_n(model, from, h, m, 2, estimates, k, y);
-  case 3:
-    return step_of_n(model, from, h, m, 3, estimates, k, y);
   case 4:
     return step_of_n(model, from, h, m, 4, estimates, k, y);
   default:
@@ -375,7 +373,7 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
   }
   if (is_merged) hx_part_impulses(merged, trial->impulses.contact);
   /* y_1 = y_0 + sum b_i k_i, error = |sum e_i k_i| */
-  const int estimates = m->error_order > 0 && model->step == 0.0;
+  const int estimates = model->step == 0.0;
   hxStepEnd end = end_step(model, start->y, h, m, estimates, k, &trial->y);
   trial->error = estimates ? error_norm(model, &end) : 0.0;
   trial->y.actuator_work =

@@ -39,7 +39,7 @@ typedef struct {
 static double depth_of_load(const hxSoil *soil, double load, double low, double high) {
   for (int i = 0; i < 100; ++i) {
     const double middle = 0.5 * (low + high);
-    if (hx_soil_virgin(soil, middle).force <= load)
+    if (hx_soil_virgin(soil, middle) <= load)
       low = middle;
     else
       high = middle;
@@ -58,9 +58,9 @@ static hxSunk sunk(const hxModel *model, const hxContactState *contact, const hx
   hxSunk sphere = {row, slot, depths->delta[row][slot] + contact->plastic[soft][slot], radius, 0};
   if (sphere.depth <= radius || !is_in_soil) return sphere;
   const hxSoil soil = hx_contact_soil(contact, row, slot);
-  if (hx_soil_virgin(&soil, radius).force > weight) return sphere;
+  if (hx_soil_virgin(&soil, radius) > weight) return sphere;
   sphere.is_in_soil = 1;
-  sphere.bound = hx_soil_virgin(&soil, sphere.depth).force <= weight
+  sphere.bound = hx_soil_virgin(&soil, sphere.depth) <= weight
                      ? sphere.depth
                      : depth_of_load(&soil, weight, radius, sphere.depth);
   return sphere;

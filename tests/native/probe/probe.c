@@ -62,22 +62,33 @@ HX_API void hx_probe_power(const double *x, const double *y, double *power, doub
 /* ---- soil ---- */
 
 /* Writes F_v, its slope, plastic depth, f_n, its elastic part and derivatives, stored energy, shear
- * base and its slope; row NULL: from the definition. */
+ * base and tan phi; row NULL: from the definition. */
 HX_API void hx_probe_soil(const hxSoilDefinition *definition, const double *row, double radius,
-                          double pad, double plastic, double z, double dz, double out[12]) {
+                          double pad, double plastic, double z, double dz, double out[10]) {
   const hxSoilShape shape = {radius, pad, 0.0};
   hxSoil soil;
   if (row)
     hx_soil_from_row(row, &shape, &soil);
   else
     hx_soil_compile(definition, &shape, &soil);
-  const hxSoilCurve virgin = hx_soil_virgin(&soil, z), base = hx_soil_shear_base(&soil, z);
-  const hxSoilForce force = hx_soil_normal_force(&soil, plastic, z, dz);
-  out[0] = virgin.force, out[1] = virgin.slope, out[2] = hx_soil_plastic_depth(&soil, z);
-  out[3] = force.force, out[4] = force.elastic, out[5] = force.stiffness, out[6] = force.viscosity;
-  out[7] = hx_soil_stored_energy(&soil, plastic, z);
-  out[8] = base.force, out[9] = base.slope, out[10] = soil.friction;
-  out[11] = hx_soil_contact(&soil, plastic, z, dz).held.slope;
+  hxReal numbers[HX_SOIL_SIZE];
+  hxSoils soils;
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_splat(((const double *)&soil)[i]);
+  memcpy(&soils, numbers, sizeof soils);
+  const hxReal p = hx_splat(plastic), at = hx_splat(z);
+  const hxSoilCurves virgin = hx_virgin(&soils, at);
+  const hxSoilForces f = hx_soil_forces(&soils, p, at, hx_splat(dz), virgin);
+  const hxReal result[10] = {virgin.force,
+                             virgin.slope,
+                             hx_plastic_depth(&soils, at, virgin),
+                             f.force,
+                             f.elastic,
+                             f.stiffness,
+                             f.viscosity,
+                             hx_stored_energy(&soils, p, at, virgin),
+                             hx_shear_base(&soils, at),
+                             soils.friction};
+  for (int i = 0; i < 10; ++i) out[i] = hx_lane(result[i], 0);
 }
 
 /* Adds 1500 footprints at x = 0, 1, ... of depths 1, 2, ... mm, then in a call 100 of 2 m at the
@@ -223,10 +234,10 @@ HX_API void hx_probe_gear(const hxPlant *plant, double speed, double motor, doub
 
 /* Computes a servo. command: angle, speed, torque; out: torque, friction, stiffness, damping. */
 HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
-                           const double command[3], double out[4]) {
+                           const double command[4], double out[4]) {
   const hxServo servo = hx_servo_torque(
       &plant->model, hx_splat(angle), hx_splat(speed), hx_splat(command[0]), hx_splat(command[1]),
-      hx_splat(command[2]), (hxPower){hx_splat(1.0), hx_splat(1.0)});
+      hx_splat(command[2]), (hxPower){hx_splat(1.0), hx_splat(1.0), hx_splat(command[3])});
   out[0] = hx_lane(servo.torque, 0), out[1] = hx_lane(servo.friction, 0);
   out[2] = hx_lane(servo.stiffness, 0), out[3] = hx_lane(servo.damping + servo.drag, 0);
 }
@@ -417,12 +428,12 @@ HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
   return hx_kernels[i]->name;
 }
 
-/* Copies a row of the methods. shape: stages, order, error order; others as in hxMethodRow. */
-HX_API void hx_probe_method(int method, int shape[3], double *gamma, double a[HX_STAGES][HX_STAGES],
+/* Copies a row of the methods. shape: stages, order; others as in hxMethodRow. */
+HX_API void hx_probe_method(int method, int shape[2], double *gamma, double a[HX_STAGES][HX_STAGES],
                             double g[HX_STAGES][HX_STAGES], double c[HX_STAGES],
                             double b[HX_STAGES], double e[HX_STAGES]) {
   const hxMethodRow *row = hx_method(method);
-  shape[0] = row->stages, shape[1] = row->order, shape[2] = row->error_order;
+  shape[0] = row->stages, shape[1] = row->order;
   *gamma = row->gamma;
   memcpy(a, row->a, sizeof row->a), memcpy(g, row->g, sizeof row->g);
   memcpy(c, row->c, sizeof row->c), memcpy(b, row->b, sizeof row->b),

@@ -1,12 +1,10 @@
-/* compliance.h - the force laws of compliant control: from planned load and
- * measured foot forces to the servos' torques. Python:
- * controller/comply/compliance.py. */
+/* compliance.h - the force laws of compliant control: from planned load and measured foot forces to
+ * the servos' torques. Python: controller/comply/compliance.py. */
 #ifndef HX_COMPLIANCE_H
 #define HX_COMPLIANCE_H
 
 #include "../sense/burden.h"
 #include "../sense/contact_detection.h"
-#include "../sense/landing.h"
 #include "../sense/touchdown.h"
 #include "../sense/trust.h"
 #include "load_plan.h"
@@ -18,8 +16,7 @@ typedef struct hxComplianceModel {
   hxBurdenModel burden;
   hxTrustModel trust;
   double period; /* s */
-  /* N, of the robot; a third of it; load of all feet from which on they have
-   * settled */
+  /* N, of the robot; a third of it; load of all feet from which on they have settled */
   double weight, share, settled;
   double most_lean; /* m, limit of the distance of the centre of mass, each axis */
   double high;      /* m, a foot that is planned higher is in the air for certain */
@@ -38,21 +35,17 @@ typedef struct hxCompliance {
   double load[HX_LEGS];              /* 1    smoothed, in thirds of the weight */
   double torque[HX_LEGS][HX_JOINTS]; /* N m, for the servos */
   int doubted[HX_LEGS];              /* the foot's sensor is not trusted */
-  /* walks without feedback, because the sensor is not trusted, the robot
-   * slides, or its joints do not follow */
+  /* walks without feedback, because the sensor is not trusted, the robot slides, or its joints do
+   * not follow */
   int fallback[HX_LEGS];
-  double grip[HX_LEGS]; /* 1, factor on the planned load of a leg that is
-                           regaining contact */
+  double grip[HX_LEGS]; /* 1, factor on the planned load of a leg that is regaining contact */
   int regaining;        /* some grip may be below 1 */
   double scale;         /* 1    measured over planned weight */
-  hxPlane lean;         /* m, of the measured centre of mass from the modelled one,
-                           walking frame */
-  double held;          /* 1, share of the planned squeeze that the ground holds,
-                           smoothed */
+  hxPlane lean;         /* m, of the measured centre of mass from the modelled one, walking frame */
+  double held;          /* 1, share of the planned squeeze that the ground holds, smoothed */
 } hxCompliance;
 
-/* 1, of the weight: feet that carry less in all have only just met the ground
- */
+/* 1, of the weight: feet that carry less in all have only just met the ground */
 static const double settled_share = 0.5;
 static const double gripped = 0.99;    /* 1, of its share: a leg that is given more carries it */
 static const double load_floor = 1e-6; /* N, a smaller sum of loads cannot be divided by */
@@ -60,16 +53,14 @@ static const double load_floor = 1e-6; /* N, a smaller sum of loads cannot be di
 static const double least_scale = 0.5, largest_scale = 3.0;
 /* 1, of the depth of the ground: distance of the centre of mass, each axis */
 static const double largest_lean = 0.4;
-/* 1, of the step height: a foot that is planned higher is in the air for
- * certain */
+/* 1, of the step height: a foot that is planned higher is in the air for certain */
 static const double high_share = 0.25;
 static const double carrying =
     0.1; /* 1, in thirds of the weight: an awaited foot with more stands */
 
 enum {
   HX_TRIPOD_LEGS = 3
-}; /* legs that share the weight in the hardest gait: loads are counted in
-      weight / 3 */
+}; /* legs that share the weight in the hardest gait: loads are counted in weight / 3 */
 
 static inline double total_weight(const hxControllerDefinition *d) {
   double mass = d->torso.mass;
@@ -108,8 +99,16 @@ static inline void hx_compliance_reset(hxCompliance *laws) {
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->grip[leg] = 1.0;
 }
 
-/* -----------------------------------------------------------------------------------
- * contacts */
+/* Returns measured over modelled weight [1] (C32). */
+static inline double hx_compliance_heft(const hxCompliance *laws) { return laws->burden.heft; }
+
+/* Returns the torque needed for the measured weight over the torque allowed [1]. */
+static inline double hx_compliance_needed(const hxComplianceModel *model,
+                                          const hxCompliance *laws) {
+  return laws->burden.heft * laws->burden.peak / model->most;
+}
+
+/* ----------------------------------------------------------------------------------- contacts */
 
 /* Replaces the forces of sensors that are not trusted by the planned ones. */
 static inline void replace_forces(const hxLoadPlan *plan, double force[HX_LEGS][3],
@@ -123,9 +122,8 @@ static inline void replace_forces(const hxLoadPlan *plan, double force[HX_LEGS][
   }
 }
 
-/* Decides which sensors are trusted (C34). When the sensors of three feet are
- * not, none is. met: heights at which the feet meet the ground without a bump
- * [m]. */
+/* Decides which sensors are trusted (C34). When the sensors of three feet are not, none is. met:
+ * heights at which the feet meet the ground without a bump [m]. */
 static inline void judge_sensors(const hxComplianceModel *model, const hxLoadPlan *plan,
                                  const double met[HX_LEGS], double force[HX_LEGS][3],
                                  hxCompliance *laws) {
@@ -145,8 +143,7 @@ static inline void judge_sensors(const hxComplianceModel *model, const hxLoadPla
   if (doubted) replace_forces(plan, force, laws);
 }
 
-/* Returns whether a foot carries so much that the gait clock need not wait for
- * it. */
+/* Returns whether a foot carries so much that the gait clock need not wait for it. */
 static inline int carries(const hxCompliance *laws, int leg) {
   return laws->touching[leg] && laws->load[leg] > carrying;
 }
@@ -159,7 +156,7 @@ static inline void meet_ground(const hxComplianceModel *model, const hxLoadPlan 
   laws->regaining = 1;
   hx_landings_early(&laws->landings, met, plan->height, early);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    falling[leg] = early[leg] ? plan->falling[leg] : 0.0;
+    falling[leg] = early[leg] ? plan->descent[leg] : 0.0;
     searching[leg] = plan->awaited[leg] && !laws->doubted[leg] && !carries(laws, leg);
   }
   hx_touchdown_step(model->period, laws->touching, falling, plan->swinging, plan->standing,
@@ -178,21 +175,18 @@ static inline void examine_contacts(const hxComplianceModel *model, const hxLoad
     meet_ground(model, plan, met, laws);
 }
 
-/* Returns whether contacts contradict the plan, or have done so and the
- * reaction is in progress. */
+/* Returns whether contacts contradict the plan, or have done so and the reaction is in progress. */
 static inline int contacts_differ(const hxLoadPlan *plan, const hxCompliance *laws) {
   int found = hx_sensor_watch_busy(&laws->watch) || hx_touchdown_busy(&laws->touchdown);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     found |= plan->awaited[leg] || (laws->touching[leg] != plan->standing[leg] &&
-                                    (plan->standing[leg] || plan->well_up[leg]));
+                                    (plan->standing[leg] || plan->height[leg] > hx_early));
   return found;
 }
 
-/* --------------------------------------------------------------------------
- * inputs and weight */
+/* -------------------------------------------------------------------------- inputs and weight */
 
-/* Updates the trust and with it the legs without feedback (C33). drag: as for
- * hx_trust_step. */
+/* Updates the trust and with it the legs without feedback (C33). drag: as for hx_trust_step. */
 static inline void update_trust(const hxComplianceModel *model, const hxLoadPlan *plan, double drag,
                                 hxCompliance *laws) {
   const double before = laws->trust.level,
@@ -202,9 +196,8 @@ static inline void update_trust(const hxComplianceModel *model, const hxLoadPlan
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->fallback[leg] = laws->doubted[leg] || goal == 0.0;
 }
 
-/* Returns the share of the planned squeeze that creep has taken away, in [0, 1]
- * (C46); 0 without planned squeeze. deviation: of the tangential forces from
- * the planned ones [N]. */
+/* Returns the share of the planned squeeze that creep has taken away, in [0, 1] (C46); 0 without
+ * planned squeeze. deviation: of the tangential forces from the planned ones [N]. */
 static inline double squeeze_lost(const hxLoadPlan *plan, const hxPlane deviation[HX_LEGS],
                                   const hxCompliance *laws) {
   double whole = 0.0, present = 0.0;
@@ -217,9 +210,9 @@ static inline double squeeze_lost(const hxLoadPlan *plan, const hxPlane deviatio
   return whole <= load_floor ? 0.0 : hx_clamp(-present / whole, 0.0, 1.0);
 }
 
-/* Computes the normal forces and returns their sum [N]. Updates trust (C33),
- * the smoothed loads (C27) and the share of the planned squeeze that is held
- * (C52) by the deviations of the tangential forces (C24). */
+/* Computes the normal forces and returns their sum [N]. Updates trust (C33), the smoothed loads
+ * (C27) and the share of the planned squeeze that is held (C52) by the deviations of the tangential
+ * forces (C24). */
 static inline double feel(const hxComplianceModel *model, const hxLoadPlan *plan,
                           const double force[HX_LEGS][3], double normal[HX_LEGS],
                           hxCompliance *laws) {
@@ -244,9 +237,8 @@ static inline double feel(const hxComplianceModel *model, const hxLoadPlan *plan
   return total;
 }
 
-/* Updates the distance of the centre of mass from the modelled one (C44). The
- * planned loads contain the present distance. normal: measured [N]; total:
- * their sum. */
+/* Updates the distance of the centre of mass from the modelled one (C44). The planned loads contain
+ * the present distance. normal: measured [N]; total: their sum. */
 static inline void update_lean(const hxComplianceModel *model, const hxLoadPlan *plan,
                                const double normal[HX_LEGS], double total, hxCompliance *laws) {
   hxPlane measured = {0.0, 0.0}, planned = {0.0, 0.0};
@@ -262,9 +254,8 @@ static inline void update_lean(const hxComplianceModel *model, const hxLoadPlan 
   laws->lean.y = hx_clamp(lean.y, -model->most_lean, model->most_lean);
 }
 
-/* Updates the ratio of measured to planned weight (C30), the centre of mass
- * (C44), and the part of the weight that the servos carry. normal: measured
- * normal forces [N]; total: their sum [N]. */
+/* Updates the ratio of measured to planned weight (C30), the centre of mass (C44), and the part of
+ * the weight that the servos carry. normal: measured normal forces [N]; total: their sum [N]. */
 static inline void update_weight(const hxComplianceModel *model, const hxLoadPlan *plan,
                                  const double normal[HX_LEGS], double total, hxCompliance *laws) {
   const double ratio = total / hx_larger(plan->weight, load_floor),
@@ -279,11 +270,10 @@ static inline void update_weight(const hxComplianceModel *model, const hxLoadPla
   hx_burden_step(&model->burden, plan->needed, laws->scale, &laws->burden);
 }
 
-/* -------------------------------------------------------------------------------------
- * joints */
+/* ------------------------------------------------------------------------------------- joints */
 
-/* Takes its share from a leg that does not touch the ground where it should
- * stand, and gives it back gradually once the leg touches (C28). */
+/* Takes its share from a leg that does not touch the ground where it should stand, and gives it
+ * back gradually once the leg touches (C28). */
 static inline void restore_grip(const hxComplianceModel *model, const hxLoadPlan *plan,
                                 hxCompliance *laws) {
   laws->regaining = 0;
@@ -295,8 +285,7 @@ static inline void restore_grip(const hxComplianceModel *model, const hxLoadPlan
   }
 }
 
-/* Sets the torques of the planned load: trust (own + grip strength scale carry)
- * (C29). */
+/* Sets the torques of the planned load: trust (own + grip strength scale carry) (C29). */
 static inline void actuate(const hxComplianceModel *model, const hxLoadPlan *plan,
                            hxCompliance *laws) {
   const int limited = model->parts.limits;
@@ -312,23 +301,21 @@ static inline void actuate(const hxComplianceModel *model, const hxLoadPlan *pla
     }
 }
 
-/* Returns the height offsets of the feet [m] (C36), and in *busy whether they
- * are changing. */
+/* Returns the height offsets of the feet [m] (C36), and in *busy whether they are changing. */
 static inline const double *hx_compliance_raised(const hxCompliance *laws, int *busy) {
   *busy = hx_touchdown_busy(&laws->touchdown);
   return laws->touchdown.offset;
 }
 
-/* Returns whether a foot on its way down has met the ground, and not a sensor
- * that lies (C51). */
+/* Returns whether a foot on its way down has met the ground, and not a sensor that lies (C51). */
 static inline int hx_compliance_meets(const hxComplianceModel *model, int leg,
                                       const hxCompliance *laws) {
   return model->parts.touchdown && laws->trust.level == 1.0 && laws->touching[leg] &&
          !laws->doubted[leg];
 }
 
-/* Returns whether the gait clock waits for the feet of legs that end their
- * swing (C50). held: it waits already. */
+/* Returns whether the gait clock waits for the feet of legs that end their swing (C50). held: it
+ * waits already. */
 static inline int hx_compliance_waits(const hxComplianceModel *model, const int landing[HX_LEGS],
                                       int held, const hxCompliance *laws) {
   int waits = 0;
@@ -342,8 +329,8 @@ static inline int hx_compliance_waits(const hxComplianceModel *model, const int 
   return waits;
 }
 
-/* Advances the laws by one period. force: of the ground on the feet, walking
- * frame [N]; replaced by the planned one where a sensor is not trusted. */
+/* Advances the laws by one period. force: of the ground on the feet, walking frame [N]; replaced by
+ * the planned one where a sensor is not trusted. */
 static inline void hx_compliance_step(const hxComplianceModel *model, const hxLoadPlan *plan,
                                       double force[HX_LEGS][3], hxCompliance *laws) {
   double normal[HX_LEGS];

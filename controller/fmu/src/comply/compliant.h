@@ -1,13 +1,15 @@
-/* compliant.h - compliant control around its laws, from the sensors to the
- * corrected feet. Python: controller/comply/compliant.py. */
+/* compliant.h - compliant control around its laws, from the sensors to the corrected feet. Python:
+ * controller/comply/compliant.py. */
 #ifndef HX_COMPLIANT_H
 #define HX_COMPLIANT_H
 
 #include "../sense/load_adaptation.h"
+#include "../walk/gait_clock.h"
 #include "../walk/hold.h"
 #include "../walk/swing.h"
 #include "compliance.h"
 #include "planned_squeeze.h"
+#include "support.h"
 #include <string.h>
 
 typedef struct hxCompliantModel {
@@ -22,12 +24,11 @@ typedef struct hxCompliantModel {
   hxLoadAdaptationModel adaptation;
 } hxCompliantModel;
 
-/* Velocity that steers back to the path, added to the commanded one, with a
- * transition from one value to the next. */
+/* Velocity that steers back to the path, added to the commanded one, with a transition from one
+ * value to the next. */
 typedef struct hxSteering {
   hxTwist begin, goal;
-  int64_t past; /* steps from the start of the transition to the first planned
-                   step */
+  int64_t past; /* steps from the start of the transition to the first planned step */
 } hxSteering;
 
 typedef struct hxCompliant {
@@ -36,8 +37,7 @@ typedef struct hxCompliant {
   hxLoadAdaptation adaptation;
   hxSteering steering;
   int64_t count;          /* number of steps */
-  double offset[HX_LEGS]; /* m, offsets for early and late touch-downs at the
-                             last step */
+  double offset[HX_LEGS]; /* m, offsets for early and late touch-downs at the last step */
   int moving;             /* the offsets have just changed */
 } hxCompliant;
 
@@ -50,15 +50,13 @@ typedef struct hxPresentStep {
   const hxPlane *plane; /* m  (6) planned feet, walking frame */
   hxPlane torso;        /* m, its way in the walking frame */
   const double *height; /* m, (6) heights of the lowered feet */
-  const double *rolled; /* m, (6) outwards from the stance to the positions that
-                           the feet aim at */
+  const double *rolled; /* m, (6) outwards from the stance to the positions that the feet aim at */
 } hxPresentStep;
 
 /* s, duration of the transition of the added velocity */
 static const double steering_time = 0.1;
 
-/* Computes the foot forces in the walking frame (C22) [N]: f_K = R_KT R_TW f_W.
- */
+/* Computes the foot forces in the walking frame (C22) [N]: f_K = R_KT R_TW f_W. */
 static inline void hx_sense(const hxControllerInput *input, const hxPosture *posture,
                             double force[HX_LEGS][3]) {
   const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
@@ -107,7 +105,10 @@ static inline void hx_compliant_compile(const hxControllerDefinition *definition
   hx_planned_squeeze_compile(definition, model->laws.weight, -model->dynamics.floor,
                              &model->squeeze);
   hx_hold_compile(definition, &model->hold);
-  hx_load_adaptation_compile(definition, &model->adaptation);
+  const hxParts *parts = &definition->parts;
+  hx_load_adaptation_compile(definition, parts->support ? parts->squeeze : 0.0,
+                             parts->support && definition->gait.narrowing > 0.0,
+                             &model->adaptation);
 }
 
 static inline void hx_compliant_reset(const hxCompliantModel *model, hxCompliant *compliant) {
@@ -116,9 +117,9 @@ static inline void hx_compliant_reset(const hxCompliantModel *model, hxCompliant
   hx_load_adaptation_reset(&model->adaptation, &compliant->adaptation);
 }
 
-/* Computes the planned loads of a step whose feet and contacts are set (C19,
- * C20, C42). The moment of the demand becomes that about the measured centre of
- * mass. height, rise: as for hx_plan_load. */
+/* Computes the planned loads of a step whose feet and contacts are set (C19, C20, C42). The moment
+ * of the demand becomes that about the measured centre of mass. height, rise: as for
+ * hx_plan_load. */
 static inline void hx_compliant_plan(const hxCompliantModel *model, const hxCompliant *compliant,
                                      const double height[HX_LEGS], const double rise[HX_LEGS],
                                      hxDemand *demand, hxLoadPlan *plan) {
@@ -129,11 +130,24 @@ static inline void hx_compliant_plan(const hxCompliantModel *model, const hxComp
   hx_plan_load(model->support.active, model->period, demand, height, rise, plan);
 }
 
-/* -----------------------------------------------------------------------------------
- * steering */
+/* Computes the activations of the legs and the lowering of their feet [m] by the depth to which the
+ * ground will deform under their loads. phase: of the legs; plane: feet, walking frame [m]; clock:
+ * of the gait, in the section of the step. */
+static inline void hx_compliant_lowered(const hxCompliantModel *model, const hxGaitClock *clock,
+                                        const double phase[HX_LEGS], const hxPlane plane[HX_LEGS],
+                                        double activation[HX_LEGS], double lowering[HX_LEGS]) {
+  for (int k = 0; k < HX_LEGS; ++k)
+    activation[k] = clock->awaited[k]
+                        ? 0.0
+                        : hx_support_activation(&model->support, phase[k], clock->stayed[k],
+                                                clock->stays[k], clock->walking);
+  hx_support_lowering(&model->support, plane, activation, lowering);
+}
 
-/* Returns what is added to the commanded velocity a number of periods after the
- * first planned step (C40). */
+/* ----------------------------------------------------------------------------------- steering */
+
+/* Returns what is added to the commanded velocity a number of periods after the first planned step
+ * (C40). */
 static inline hxTwist hx_compliant_addition(const hxCompliantModel *model,
                                             const hxCompliant *compliant, int64_t steps) {
   const hxSteering *s = &compliant->steering;
@@ -143,9 +157,9 @@ static inline hxTwist hx_compliant_addition(const hxCompliantModel *model,
                    s->begin.yaw_rate + (s->goal.yaw_rate - s->begin.yaw_rate) * part};
 }
 
-/* Called before new steps are planned: takes over the corrections of the slow
- * loops, when a leg lifts off or touches down (afresh), and at a stop (not
- * moves) (C40). steps: periods since the last planning. */
+/* Called before new steps are planned: takes over the corrections of the slow loops, when a leg
+ * lifts off or touches down (afresh), and at a stop (not moves) (C40). steps: periods since the
+ * last planning. */
 static inline void hx_compliant_steer(const hxCompliantModel *model, int64_t steps, int moves,
                                       int afresh, hxCompliant *compliant) {
   hxSteering *s = &compliant->steering;
@@ -160,8 +174,7 @@ static inline void hx_compliant_steer(const hxCompliantModel *model, int64_t ste
   s->past = 0;
 }
 
-/* ------------------------------------------------------------------------------------
- * sensors */
+/* ------------------------------------------------------------------------------------ sensors */
 
 /* Passes the measured positions of the standing feet to the slow loops. */
 static inline void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
@@ -194,8 +207,7 @@ static inline void look(const hxCompliantModel *model, const hxLegSolver leg[HX_
   hx_hold_look(&model->hold, &seen, &compliant->hold);
 }
 
-/* ---------------------------------------------------------------------------------------
- * step */
+/* --------------------------------------------------------------------------------------- step */
 
 /* Computes the joint angles of a leg with the foot raised (C41). */
 static inline void correct(const hxLegSolver *leg, const double climb[HX_JOINTS], double raised,
@@ -205,8 +217,7 @@ static inline void correct(const hxLegSolver *leg, const double climb[HX_JOINTS]
                             leg->angle_max[joint]);
 }
 
-/* Advances by one period: corrects the joint commands of this step in place
- * (C41). */
+/* Advances by one period: corrects the joint commands of this step in place (C41). */
 static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
                                      const hxPresentStep *present, const hxControllerInput *input,
                                      hxCompliant *compliant, hxControllerOutput *output) {
@@ -238,8 +249,8 @@ static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegS
     output->lift[k] = raised;
   }
   if (busy || compliant->moving) compliant->moving = busy;
-  const double needed = laws->burden.heft * laws->burden.peak / model->laws.most;
-  hx_load_adaptation_weigh(&model->adaptation, laws->burden.heft, &compliant->adaptation);
+  const double needed = hx_compliance_needed(&model->laws, laws);
+  hx_load_adaptation_weigh(&model->adaptation, hx_compliance_heft(laws), &compliant->adaptation);
   hx_load_adaptation_step(&model->adaptation, (const double (*)[HX_JOINTS])laws->torque, needed,
                           laws->held, &compliant->adaptation);
 }

@@ -1,10 +1,9 @@
-/* load_plan.h - planned loads and contacts of one step, which the force laws
- * compare with the sensors (C29). Python: controller/comply/load_plan.py. */
+/* load_plan.h - planned loads and contacts of one step, which the force laws compare with the
+ * sensors (C29). Python: controller/comply/load_plan.py. */
 #ifndef HX_LOAD_PLAN_H
 #define HX_LOAD_PLAN_H
 
-#include "../sense/touchdown.h"
-#include "support.h"
+#include "shares.h"
 
 /* Planned loads and contacts of one step. */
 typedef struct hxLoadPlan {
@@ -14,20 +13,17 @@ typedef struct hxLoadPlan {
   hxPlane feet[HX_LEGS];  /* m    contact points */
   double weight;          /* N, sum of all shares */
   int standing[HX_LEGS];  /* the leg carries its whole share */
-  int well_up[HX_LEGS];   /* the foot is in the air even if it meets the ground
-                             early */
   double height[HX_LEGS]; /* m, of the paths above their ends */
   double needed;          /* N m, largest element of carry */
   int swinging[HX_LEGS];
   int awaited[HX_LEGS];    /* the gait clock waits for the foot */
-  double falling[HX_LEGS]; /* m, by which feet well above the ground move down
-                              in a period */
+  double descent[HX_LEGS]; /* m, by which the feet come down in a period, at least 0 */
   int overspeed;           /* the plan exceeds the speed limit of some joint */
 } hxLoadPlan;
 
-/* Computes the rest of a plan whose shares and contacts are set. active: the
- * servos carry the load; otherwise all torques are 0. height, rise: of the
- * feet's paths above the stance [m, m/s]; period: of the controller [s]. */
+/* Computes the rest of a plan whose shares and contacts are set. active: the servos carry the load;
+ * otherwise all torques are 0. height, rise: of the feet's paths above the stance [m, m/s]; period:
+ * of the controller [s]. */
 static inline void hx_plan_load(int active, double period, const hxDemand *demand,
                                 const double height[HX_LEGS], const double rise[HX_LEGS],
                                 hxLoadPlan *plan) {
@@ -44,9 +40,8 @@ static inline void hx_plan_load(int active, double period, const hxDemand *deman
     }
     plan->weight += plan->shares.normal[leg];
     plan->standing[leg] = plan->shares.activation[leg] >= 1.0;
-    plan->well_up[leg] = height[leg] > hx_early;
     plan->height[leg] = height[leg];
-    plan->falling[leg] = plan->well_up[leg] ? hx_larger(-period * rise[leg], 0.0) : 0.0;
+    plan->descent[leg] = hx_larger(-period * rise[leg], 0.0);
   }
 }
 

@@ -1,24 +1,23 @@
-/* paper.h - the paper's control: foot trajectories corrected by the deviations
- * that the ground causes. Python: controller/comply/paper.py. */
+/* paper.h - the paper's control: foot trajectories corrected by the deviations that the ground
+ * causes. Python: controller/comply/paper.py. */
 #ifndef HX_PAPER_H
 #define HX_PAPER_H
 
 #include "../plane.h"
 #include "../walk/kinematics.h"
-#include "support.h"
+#include "shares.h"
 
 typedef struct hxPaperModel {
-  double period;                    /* s */
-  double servo_stiffness;           /* N m/rad  kp of the servos */
-  double ground_stiffness;          /* N/m^1.5 */
-  int pid, suspension, lifts;       /* enabled parts; feet in the air are lifted */
-  double share, height_share;       /* 1, of this gait */
-  double yield_share;               /* 1 */
-  double return_rate;               /* 1/s */
-  double damping;                   /* N s/m */
-  double sag_limit, limit;          /* m */
-  double weighing, smoothing;       /* 1, part of a new sum of loads and of a new
-                                       force, per period */
+  double period;              /* s */
+  double servo_stiffness;     /* N m/rad  kp of the servos */
+  double ground_stiffness;    /* N/m^1.5 */
+  int pid, suspension, lifts; /* enabled parts; feet in the air are lifted */
+  double share, height_share; /* 1, of this gait */
+  double yield_share;         /* 1 */
+  double return_rate;         /* 1/s */
+  double damping;             /* N s/m */
+  double sag_limit, limit;    /* m */
+  double weighing, smoothing; /* 1, part of a new sum of loads and of a new force, per period */
   double landed, in_air, on_ground; /* 1, factors of a decay over a period */
 } hxPaperModel;
 
@@ -29,8 +28,7 @@ typedef struct hxPaper {
   double sag;               /* m, height by which the torso sags at its centre */
   hxPlane slope;            /* 1, of the sag */
   double lifted[HX_LEGS];   /* m, lift by the torso's sag */
-  double yielded[HX_LEGS];  /* m, deflection of the suspensions; positive: the
-                               leg is shorter */
+  double yielded[HX_LEGS];  /* m, deflection of the suspensions; positive: the leg is shorter */
   double late[HX_LEGS];     /* s, time without force since the planned touch-down */
   hxPlane shift[HX_LEGS];   /* m, correction of a foot along the ground, torso axes */
   double lift[HX_LEGS];     /* m, correction upwards */
@@ -65,8 +63,7 @@ static const double air_time = 0.06; /* s, in which the suspension of a foot in 
 
 static inline void hx_paper_compile(const hxControllerDefinition *definition, hxPaperModel *model) {
   const double h = definition->period, duty = definition->gait.duty;
-  /* the torque that a share costs grows with the square of the load, W/(6 duty)
-   * on average */
+  /* the torque that a share costs grows with the square of the load, W/(6 duty) on average */
   const double factor = definition->parts.paper_share ? (2.0 * duty) * (2.0 * duty) : 0.0;
   model->period = h;
   model->servo_stiffness = definition->servo.kp;
@@ -89,8 +86,8 @@ static inline void hx_paper_compile(const hxControllerDefinition *definition, hx
   model->on_ground = hx_decay(-h / definition->gains.paper.return_time);
 }
 
-/* Updates the torso's sag and the return of the feet by the standing feet (C26,
- * C47). load: smoothed normal forces [N]. */
+/* Updates the torso's sag and the return of the feet by the standing feet (C26, C47). load:
+ * smoothed normal forces [N]. */
 static inline void see_torso(const hxPaperModel *model, const hxLegSolver leg[HX_LEGS],
                              const hxPaperStep *step, const double load[HX_LEGS], hxPaper *paper) {
   double part[HX_LEGS], sunk[HX_LEGS], total = 0.0, mean = 0.0, spread = 0.0;
@@ -132,8 +129,8 @@ static inline void see_torso(const hxPaperModel *model, const hxLegSolver leg[HX
   paper->back = hx_scaled(back, model->limit / fmax(hx_length(back), model->limit));
 }
 
-/* Returns the correction of a foot along the ground [m] (C47). borne: normal
- * force whose deviation is taken back [N]. */
+/* Returns the correction of a foot along the ground [m] (C47). borne: normal force whose deviation
+ * is taken back [N]. */
 static inline hxPlane along_ground(const hxPaperModel *model, const hxPaper *paper,
                                    const hxPose *pose, const hxSoftness *soft, int swinging, int k,
                                    double borne) {
@@ -141,8 +138,7 @@ static inline hxPlane along_ground(const hxPaperModel *model, const hxPaper *pap
   if (model->pid) {
     const hxPlane pull =
         hx_times(hx_plane(paper->force[k][0], paper->force[k][1]), hx_conj(pose->heading));
-    /* a standing foot keeps the outward force, which carries a part of the
-     * weight */
+    /* a standing foot keeps the outward force, which carries a part of the weight */
     const hxPlane yield = {swinging ? soft->outward * pull.x : 0.0, soft->sideward * pull.y};
     shift = hx_plane_add(shift, hx_scaled(hx_times(yield, pose->heading), model->yield_share));
   }
@@ -160,8 +156,7 @@ static inline void lift_swinging(const hxPaperModel *model, const double planned
     paper->lifted[k] *= model->landed;
 }
 
-/* Updates the deflection of a suspension (C48). total: of the normal forces
- * [N]. */
+/* Updates the deflection of a suspension (C48). total: of the normal forces [N]. */
 static inline void suspend(const hxPaperModel *model, const hxPaperStep *step, double total, int k,
                            hxPaper *paper) {
   const double h = model->period, force = step->force[k][2];
@@ -204,9 +199,8 @@ static inline void hx_paper_step(const hxPaperModel *model, const hxLegSolver le
   }
 }
 
-/* Computes the joint angles [rad] and speeds [rad/s] that put a foot on its
- * corrected trajectory (C49), and returns whether the foot misses it. The
- * planned foot is in the torso frame. */
+/* Computes the joint angles [rad] and speeds [rad/s] that put a foot on its corrected trajectory
+ * (C49), and returns whether the foot misses it. The planned foot is in the torso frame. */
 static inline int hx_paper_actuate(const hxPaper *paper, const hxLegSolver *leg, int k,
                                    hxPlane plane, double height, hxPlane velocity, double rise,
                                    double angle[HX_JOINTS], double speed[HX_JOINTS]) {

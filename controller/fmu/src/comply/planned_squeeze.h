@@ -1,10 +1,9 @@
-/* planned_squeeze.h - forces by which the standing legs squeeze each other, so
- * that friction carries a part of the servos' load. Python:
- * controller/comply/planned_squeeze.py. */
+/* planned_squeeze.h - forces by which the standing legs squeeze each other, so that friction
+ * carries a part of the servos' load. Python: controller/comply/planned_squeeze.py. */
 #ifndef HX_PLANNED_SQUEEZE_H
 #define HX_PLANNED_SQUEEZE_H
 
-#include "support.h"
+#include "shares.h"
 
 typedef struct hxPlannedSqueeze {
   double friction; /* 1, coefficient that is believed */
@@ -16,8 +15,7 @@ static const double most_friction = 0.7;
 /* N, floor of a change of a force that a factor is divided by */
 static const double least_push = 1e-12;
 
-/* weight: of the robot [N]; depth: of the ground below the torso's origin in
- * the stance [m]. */
+/* weight: of the robot [N]; depth: of the ground below the torso's origin in the stance [m]. */
 static inline void hx_planned_squeeze_compile(const hxControllerDefinition *definition,
                                               double weight, double depth,
                                               hxPlannedSqueeze *model) {
@@ -26,8 +24,8 @@ static inline void hx_planned_squeeze_compile(const hxControllerDefinition *defi
   model->torque = depth * tripod_share * weight;
 }
 
-/* Computes xx, xy, yy of (J J^T + price/f_n^2)^-1, 0 without a load (C42).
- * price: of the use of friction [N2 m2]. */
+/* Computes xx, xy, yy of (J J^T + price/f_n^2)^-1, 0 without a load (C42). price: of the use of
+ * friction [N2 m2]. */
 static inline void yielding(const double lever[HX_JOINTS][3], double normal, double price,
                             double B[3]) {
   const double n = normal * normal;
@@ -60,8 +58,8 @@ static inline hxPlane wanted(const double lever[HX_JOINTS][3], const double torq
   return hx_plane(B[0] * gx + B[1] * gy, B[1] * gx + B[2] * gy);
 }
 
-/* Subtracts the sum and the moment of changes of forces, by multipliers. arm:
- * of the feet about the centre of load [m]. */
+/* Subtracts the sum and the moment of changes of forces, by multipliers. arm: of the feet about the
+ * centre of load [m]. */
 static inline void balance(const hxPlane arm[HX_LEGS], const double B[HX_LEGS][3],
                            hxPlane change[HX_LEGS]) {
   double S[6] = {0.0}, needed[3] = {0.0}, x[3], tx[HX_LEGS], ty[HX_LEGS];
@@ -78,15 +76,14 @@ static inline void balance(const hxPlane arm[HX_LEGS], const double B[HX_LEGS][3
     needed[1] += change[k].y;
     needed[2] += hx_across(arm[k], change[k]);
   }
-  hx_support_solve(S, needed, x);
+  hx_shares_solve(S, needed, x);
   for (int k = 0; k < HX_LEGS; ++k) {
     change[k].x -= B[k][0] * x[0] + B[k][1] * x[1] + tx[k] * x[2];
     change[k].y -= B[k][1] * x[0] + B[k][2] * x[1] + ty[k] * x[2];
   }
 }
 
-/* Returns the factor on all changes that keeps each foot within its friction
- * (C43). */
+/* Returns the factor on all changes that keeps each foot within its friction (C43). */
 static inline double limit(const hxPlannedSqueeze *model, const hxShares *shares,
                            const hxPlane change[HX_LEGS]) {
   double factor = 1.0;

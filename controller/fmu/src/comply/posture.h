@@ -1,6 +1,5 @@
-/* posture.h - height, roll and pitch of the torso over its feet (C10): from the
- * walking frame K to the torso frame T. Python: controller/comply/posture.py.
- */
+/* posture.h - height, roll and pitch of the torso over its feet (C10): from the walking frame K
+ * to the torso frame T. Python: controller/comply/posture.py. */
 #ifndef HX_POSTURE_H
 #define HX_POSTURE_H
 
@@ -8,16 +7,14 @@
 
 /* The torso in the walking frame. */
 typedef struct hxPosture {
-  int level;             /* height, roll, pitch and their rates are all 0: nothing to turn
-                          */
+  int level;             /* height, roll, pitch and their rates are all 0: nothing to turn */
   double height;         /* m */
   double rotation[3][3]; /* 1      R_KT */
   double rate;           /* m/s    of the height */
   double spin[3];        /* rad/s  w_KT, torso axes */
 } hxPosture;
 
-/* Sets the torso's posture: first roll about x, then pitch about y [m, rad, per
- * second]. */
+/* Sets the torso's posture: first roll about x, then pitch about y [m, rad, per second]. */
 static inline void hx_posture_of(hxPosture *posture, const double value[3], const double rate[3]) {
   double cr, sr, cp, sp;
   hx_sine_cosine(value[1], &sr, &cr);
@@ -57,8 +54,7 @@ static inline void hx_posture_turn_back(const hxPosture *posture, hxPlane *plane
   *z = q[2];
 }
 
-/* Transforms position and velocity of a foot from the walking frame to the
- * torso frame, in place.
+/* Transforms position and velocity of a foot from the walking frame to the torso frame, in place.
  */
 static inline void hx_posture_see_place(const hxPosture *posture, hxPlane *plane, double *height) {
   /* p_T = R_TK (p_K - height e_z) */

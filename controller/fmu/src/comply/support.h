@@ -1,65 +1,28 @@
-/* support.h - shares of the feet: the planned weight and acceleration of the
- * robot, distributed over the standing feet. Python:
- * controller/comply/support.py. */
+/* support.h - shares of the feet: the planned weight and acceleration of the robot, distributed
+ * over the standing feet. Python: controller/comply/support.py. */
 #ifndef HX_SUPPORT_H
 #define HX_SUPPORT_H
 
 #include "../walk/inverse_dynamics.h"
+#include "shares.h"
 #include <string.h>
 
 typedef struct hxSupport {
   int active;            /* the part is on: feet are lowered, and servos carry the load */
-  double duty, handover; /* cycles; hand-overs of a leg never overlap, whatever
-                            the gait */
+  double duty, handover; /* cycles; hand-overs of a leg never overlap, whatever the gait */
   double stiffness;      /* N/m^1.5 */
   double rest_weight;    /* N, that the robot requires in its stance */
   hxPlane rest_moment;   /* N m */
   double rest_depth;     /* m, penetration of a foot in the stance */
 } hxSupport;
 
-/* Planned forces of the ground on the feet at one step, walking frame. */
-typedef struct hxShares {
-  double activation[HX_LEGS]; /* 1  in [0, 1] */
-  double normal[HX_LEGS];     /* N */
-  hxPlane push[HX_LEGS];      /* N */
-  hxPlane squeeze[HX_LEGS];   /* N, the part of push by which the legs squeeze
-                                 each other (C42) */
-} hxShares;
-
-/* 1, of the mean square arm: feet on one line share no moment about it */
-static const double ridge_share = 1e-9;
-/* m2, makes the equations solvable when no foot stands */
-static const double least_arm = 1e-12;
-/* m2, of the feet about their centre: feet that are closer take no moment about
- * the vertical */
+/* m2, of the feet about their centre: feet that are closer take no moment about the vertical */
 static const double least_spread = 1e-4;
-static const double least_load = 1e-6; /* N, a smaller load is not shared */
 
-/* Returns the depth [m] by which the ground deforms under a load [N] (C21). */
-/* Returns the indentation [m] of the ground under a load [N], (f_n/K)^(2/3)
- * (C21). */
-static inline double hx_indentation(double load, double stiffness) {
-  return hx_two_thirds(load / stiffness);
-}
-
-/* Returns a transition from 0 to 1 over [0, 1] with continuous rate and
- * acceleration. */
+/* Returns a transition from 0 to 1 over [0, 1] with continuous rate and acceleration. */
 static inline double smooth(double x) {
   const double y = hx_clamp(x, 0.0, 1.0);
   return y * y * y * (10.0 + y * (6.0 * y - 15.0));
-}
-
-/* Solves S x = b for symmetric, positive semidefinite S (00 01 02 11 12 22) by
- * L D L^T; a ridge on the diagonal makes S definite. */
-static inline void hx_support_solve(const double S[6], const double b[3], double x[3]) {
-  const double ridge = ridge_share * (S[0] + S[3] + S[5]) + least_arm;
-  const double d0 = S[0] + ridge, l10 = S[1] / d0, l20 = S[2] / d0;
-  const double d1 = S[3] + ridge - l10 * S[1], l21 = (S[4] - l20 * S[1]) / d1;
-  const double d2 = S[5] + ridge - l20 * S[2] - l21 * l21 * d1;
-  const double y1 = b[1] - l10 * b[0], y2 = b[2] - l20 * b[0] - l21 * y1;
-  x[2] = y2 / d2;
-  x[1] = y1 / d1 - l21 * x[2];
-  x[0] = b[0] / d0 - l10 * x[1] - l20 * x[2];
 }
 
 static inline void hx_support_compile(const hxControllerDefinition *definition,
@@ -75,13 +38,11 @@ static inline void hx_support_compile(const hxControllerDefinition *definition,
   model->rest_depth = hx_indentation(rest->weight / HX_LEGS, model->stiffness);
 }
 
-/* Returns the activation of a leg at a gait phase (C18), in [0, 1]. stayed,
- * stays: the foot had no step to make at its last lift-off, or will have none
- * at its next one. */
+/* Returns the activation of a leg at a gait phase (C18), in [0, 1]. stayed, stays: the foot had no
+ * step to make at its last lift-off, or will have none at its next one. */
 static inline double hx_support_activation(const hxSupport *model, double phase, int stayed,
                                            int stays, int walking) {
-  /* a leg that stayed at its position has not given up its load and does not
-   * take it up again */
+  /* a leg that stayed at its position has not given up its load and does not take it up again */
   if (!walking || (stayed && phase >= model->duty)) return 1.0;
   const double half = 0.5 * model->handover,
                since = hx_fraction(phase + half); /* cycles since the activation began to rise */
@@ -90,8 +51,8 @@ static inline double hx_support_activation(const hxSupport *model, double phase,
   return hx_smaller(rising, falling);
 }
 
-/* Computes the vertical shares (C19): the sums of f_n and of p f_n are weight
- * and moment; no share is negative. */
+/* Computes the vertical shares (C19): the sums of f_n and of p f_n are weight and moment; no share
+ * is negative. */
 static inline void share_normal(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS],
                                 double weight, hxPlane moment, double normal[HX_LEGS]) {
   const double needed[3] = {weight, moment.x, moment.y};
@@ -105,15 +66,15 @@ static inline void share_normal(const hxPlane feet[HX_LEGS], const double activa
     S[4] += ax * feet[k].y;
     S[5] += ay * feet[k].y;
   }
-  hx_support_solve(S, needed, x);
+  hx_shares_solve(S, needed, x);
   for (int k = 0; k < HX_LEGS; ++k) {
     const double share = activation[k] * (x[0] + x[1] * feet[k].x + x[2] * feet[k].y);
     normal[k] = share < 0.0 ? 0.0 : share;
   }
 }
 
-/* Returns by how much the feet must be lower than planned, so that the torso
- * keeps its height over ground that deforms (C21) [m]. */
+/* Returns by how much the feet must be lower than planned, so that the torso keeps its height over
+ * ground that deforms (C21) [m]. */
 static inline void hx_support_lowering(const hxSupport *model, const hxPlane feet[HX_LEGS],
                                        const double activation[HX_LEGS], double lowering[HX_LEGS]) {
   double normal[HX_LEGS];
@@ -124,8 +85,7 @@ static inline void hx_support_lowering(const hxSupport *model, const hxPlane fee
     lowering[k] = hx_indentation(normal[k], model->stiffness) - model->rest_depth;
 }
 
-/* Computes the shares of feet in the walking frame (C19, C20); activations are
- * given. */
+/* Computes the shares of feet in the walking frame (C19, C20); activations are given. */
 static inline void hx_support_shares(const hxPlane feet[HX_LEGS], const hxDemand *demand,
                                      hxShares *shares) {
   double part[HX_LEGS], total = 0.0, spread = 0.0;

@@ -1,5 +1,5 @@
-/* burden.h - how much of the robot's weight its servos can carry, and the
- * resulting limits. Python: controller/sense/burden.py. */
+/* burden.h - how much of the robot's weight its servos can carry, and the resulting limits. Python:
+ * controller/sense/burden.py. */
 #ifndef HX_BURDEN_H
 #define HX_BURDEN_H
 
@@ -13,18 +13,15 @@ typedef struct hxBurdenModel {
 
 typedef struct hxBurden {
   double heft; /* 1    measured over modelled weight */
-  /* N m, largest torque of a joint that carries the model's weight, over the
-   * last gait cycle or so
+  /* N m, largest torque of a joint that carries the model's weight, over the last gait cycle or so
    */
   double peak;
-  /* 1, factor of the support, below 1 so that no servo exceeds its torque limit
-   */
+  /* 1, factor of the support, below 1 so that no servo exceeds its torque limit */
   double strength;
   int overburdened; /* the robot is far too heavy: kinematic control */
 } hxBurden;
 
-/* 1, of the time in which the support follows the weight, for the measured
- * weight */
+/* 1, of the time in which the support follows the weight, for the measured weight */
 static const double quick = 0.2;
 /* 1, part of the needed torque that servos may give */
 static const double no_support = 0.54, full_support = 0.84;
@@ -48,9 +45,8 @@ static inline void hx_burden_weigh(const hxBurdenModel *model, double ratio, hxB
   burden->heft += model->follow * (hx_clamp(ratio, lightest, heaviest) - burden->heft);
 }
 
-/* Advances by one period (C31, C32). needed: largest torque to carry the
- * model's weight [N m]; scale: measured over modelled weight, as the support
- * assumes it [1]. */
+/* Advances by one period (C31, C32). needed: largest torque to carry the model's weight [N m];
+ * scale: measured over modelled weight, as the support assumes it [1]. */
 static inline void hx_burden_step(const hxBurdenModel *model, double needed, double scale,
                                   hxBurden *burden) {
   burden->peak = hx_larger(needed, model->fade * burden->peak);

@@ -1,5 +1,5 @@
-/* adaptation.h - squeeze and width of the stance by the load of the servos.
- * Python: controller/sense/load_adaptation.py. */
+/* adaptation.h - squeeze and width of the stance by the load of the servos. Python:
+ * controller/sense/load_adaptation.py. */
 #ifndef HX_LOAD_ADAPTATION_H
 #define HX_LOAD_ADAPTATION_H
 
@@ -8,16 +8,14 @@
 #include <string.h>
 
 typedef struct hxLoadAdaptationModel {
-  double rating;              /* N2 m2, square of the continuous torque of a servo */
-  double squeeze;             /* 1, weight on ground on which feet creep, while all servos
-                                 are cool */
-  int narrows;                /* the gait has a narrow stance */
+  double rating;  /* N2 m2, square of the continuous torque of a servo */
+  double squeeze; /* 1, weight on ground on which feet creep, while all servos are cool */
+  int narrows;    /* the gait has a narrow stance */
   double follow_work, follow; /* 1, factors of the smoothings over a period */
 } hxLoadAdaptationModel;
 
 typedef struct hxLoadAdaptation {
-  double work[HX_LEGS][HX_JOINTS]; /* N2 m2, squares of the torques, smoothed
-                                      over a gait cycle */
+  double work[HX_LEGS][HX_JOINTS]; /* N2 m2, squares of the torques, smoothed over a gait cycle */
   double heat[HX_LEGS][HX_JOINTS]; /* N2 m2, the same, smoothed over a minute */
   double heft;      /* 1, measured over modelled weight, smoothed over a gait cycle */
   double narrowing; /* 1, part of the way to the narrow stance */
@@ -39,13 +37,15 @@ static const double modelled = 1.1, heavy = 1.2; /* 1, measured over modelled we
 /* 1, of the set weight of the squeeze, in the narrow stance */
 static const double spared = 0.75;
 
+/* squeeze: weight on ground on which feet creep, while all servos are cool, 0 for none [1];
+ * narrows: the gait has a narrow stance. */
 static inline void hx_load_adaptation_compile(const hxControllerDefinition *definition,
+                                              double squeeze, int narrows,
                                               hxLoadAdaptationModel *model) {
-  const double rating = definition->servo.torque_continuous,
-               squeeze = definition->parts.support ? definition->parts.squeeze : 0.0;
+  const double rating = definition->servo.torque_continuous;
   model->rating = rating * rating;
   model->squeeze = squeeze;
-  model->narrows = definition->parts.support && definition->gait.narrowing > 0.0;
+  model->narrows = narrows;
   model->follow_work = 1.0 - hx_decay(-definition->period / definition->gait.period);
   model->follow = 1.0 - hx_decay(-definition->period / heat_time);
 }
@@ -57,8 +57,7 @@ static inline void hx_load_adaptation_reset(const hxLoadAdaptationModel *model,
   adaptation->squeeze = model->squeeze;
 }
 
-/* Advances weight and narrowing by one period (C53). heft: measured over
- * modelled weight [1]. */
+/* Advances weight and narrowing by one period (C53). heft: measured over modelled weight [1]. */
 static inline void hx_load_adaptation_weigh(const hxLoadAdaptationModel *model, double heft,
                                             hxLoadAdaptation *adaptation) {
   adaptation->heft += model->follow_work * (heft - adaptation->heft);
@@ -71,10 +70,9 @@ static inline double hx_load_adaptation_laden(const hxLoadAdaptation *adaptation
   return 1.0 + adaptation->narrowing * (adaptation->heft - 1.0);
 }
 
-/* Advances by one period, after hx_load_adaptation_weigh (C45). torque:
- * feed-forward torques [N m]; needed: largest torque that the measured weight
- * needs, over the largest that is allowed [1]; held: share of the planned
- * squeeze that the ground holds [1]. */
+/* Advances by one period, after hx_load_adaptation_weigh (C45). torque: feed-forward torques [N m];
+ * needed: largest torque that the measured weight needs, over the largest that is allowed [1];
+ * held: share of the planned squeeze that the ground holds [1]. */
 static inline void hx_load_adaptation_step(const hxLoadAdaptationModel *model,
                                            const double torque[HX_LEGS][HX_JOINTS], double needed,
                                            double held, hxLoadAdaptation *adaptation) {

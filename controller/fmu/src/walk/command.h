@@ -8,8 +8,8 @@
 
 enum { HX_COMMANDS = 6 }; /* vx vy yaw_rate height roll pitch */
 
-/* Smooths steps of the command (C1): a cubic from the present value and rate to
- * the new value with rate 0. */
+/* Smooths steps of the command (C1): a cubic from the present value and rate to the new value with
+ * rate 0. */
 typedef struct hxCommandRampModel {
   double duration, period; /* s */
   int64_t end;             /* steps that a change takes */
@@ -39,8 +39,7 @@ static inline int hx_command_ramp_settled(const hxCommandRampModel *model,
   return ramp->steps >= model->end;
 }
 
-/* Returns whether the body is commanded to move, not only to change its
- * posture. */
+/* Returns whether the body is commanded to move, not only to change its posture. */
 static inline int hx_command_ramp_moves(const hxCommandRamp *ramp) {
   return ramp->target[0] != 0.0 || ramp->target[1] != 0.0 || ramp->target[2] != 0.0;
 }
@@ -86,8 +85,7 @@ static inline int hx_command_ramp_aim(const hxCommandRampModel *model,
   return 1;
 }
 
-/* Continues the change of another ramp, from its present value and rate, in the
- * model's own time.
+/* Continues the change of another ramp, from its present value and rate, in the model's own time.
  */
 static inline void hx_command_ramp_carry(const hxCommandRampModel *model,
                                          const hxCommandRampModel *before, hxCommandRamp *ramp) {

@@ -1,5 +1,5 @@
-/* fade.h - lets joint commands go on without a jump when the control changes.
- * Python: controller/walk/fade.py. */
+/* fade.h - lets joint commands go on without a jump when the control changes. Python:
+ * controller/walk/fade.py. */
 #ifndef HX_FADE_H
 #define HX_FADE_H
 
@@ -13,8 +13,8 @@ typedef struct hxFadeModel {
 /* What is added to the joint commands of the present control: it goes to 0. */
 typedef struct hxFade {
   int64_t left; /* steps of the transition; 0: none */
-  /* rad, rad/s, N m   at the begin of the transition; before its first step,
-   * the commands that the control before would give at that step */
+  /* rad, rad/s, N m   at the begin of the transition; before its first step, the commands that the
+   * control before would give at that step */
   double angle[HX_LEGS][HX_JOINTS], speed[HX_LEGS][HX_JOINTS], torque[HX_LEGS][HX_JOINTS];
 } hxFade;
 
@@ -26,8 +26,7 @@ static inline void hx_fade_compile(double period, hxFadeModel *model) {
   model->steps = (int64_t)steps;
 }
 
-/* Begins a transition from the commands of the last step, continued by a
- * period. */
+/* Begins a transition from the commands of the last step, continued by a period. */
 static HX_SELDOM void hx_fade_begin(const hxFadeModel *model, const hxControllerOutput *last,
                                     hxFade *fade) {
   fade->left = model->steps;
@@ -40,8 +39,7 @@ static HX_SELDOM void hx_fade_begin(const hxFadeModel *model, const hxController
     }
 }
 
-/* Computes the distances of the commands of the control before from those of
- * the present one. */
+/* Computes the distances of the commands of the control before from those of the present one. */
 HX_SELDOM static void compare(const hxControllerOutput *output, hxFade *fade) {
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
@@ -51,8 +49,8 @@ HX_SELDOM static void compare(const hxControllerOutput *output, hxFade *fade) {
     }
 }
 
-/* Adds to the commands of a step what is left of their distance from those of
- * the control before, during a transition. */
+/* Adds to the commands of a step what is left of their distance from those of the control before,
+ * during a transition. */
 static HX_SELDOM void hx_fade_step(const hxFadeModel *model, const hxLegSolver leg[HX_LEGS],
                                    hxFade *fade, hxControllerOutput *output) {
   if (fade->left == model->steps) compare(output, fade);

@@ -18,8 +18,8 @@ typedef struct hxFootPathsModel {
   double home_height[HX_LEGS]; /* m */
 } hxFootPathsModel;
 
-/* The feet at one step, as the command plans them, in the walking frame. goal,
- * pull, way and turn are in the ground frame. */
+/* The feet at one step, as the command plans them, in the walking frame. goal, pull, way and turn
+ * are in the ground frame. */
 typedef struct hxPlannedFeet {
   hxPlane plane[HX_LEGS];    /* m    centres, x + i y */
   double height[HX_LEGS];    /* m    z */
@@ -27,13 +27,10 @@ typedef struct hxPlannedFeet {
   double rise[HX_LEGS];      /* m/s  of z */
   double phase[HX_LEGS];     /* 1    in [0, 1) */
   double blend[HX_LEGS];     /* 1    s of swinging feet, else 0 */
-  /* m, where a swinging foot will touch down, or where a standing foot stands
-   */
+  /* m, where a swinging foot will touch down, or where a standing foot stands */
   hxPlane goal[HX_LEGS];
-  hxPlane pull[HX_LEGS];  /* m, (goal - foot)/(1 - s) of swinging feet, 0 of
-                             standing feet */
-  double rolled[HX_LEGS]; /* m, outwards from the stance to the position that
-                             the foot aims at */
+  hxPlane pull[HX_LEGS];  /* m, (goal - foot)/(1 - s) of swinging feet, 0 of standing feet */
+  double rolled[HX_LEGS]; /* m, outwards from the stance to the position that the foot aims at */
   hxPlane way;            /* m, displacement of the walking frame over the ground */
   double turn;            /* rad  of the walking frame over the ground */
   hxTwist twist;          /* of the body */
@@ -42,14 +39,11 @@ typedef struct hxPlannedFeet {
 /* The paths of the feet within a section of the walk. */
 typedef struct hxFootPaths {
   hxGaitClock clock;
-  int met[HX_LEGS]; /* the foot has met the ground on its way down, and stays
-                       where it is */
-  double narrowing; /* 1, part of the way to the narrow stance that the steps
-                       aim at */
+  int met[HX_LEGS]; /* the foot has met the ground on its way down, and stays where it is */
+  double narrowing; /* 1, part of the way to the narrow stance that the steps aim at */
 } hxFootPaths;
 
-/* 1, part of the swing after which the landing point stays fixed on the ground
- */
+/* 1, part of the swing after which the landing point stays fixed on the ground */
 static const double freeze = 0.75;
 static const double same_distance = 1e-6; /* m, distances that differ by less are equal */
 /* m, a foot this close to its stance position makes no step */
@@ -100,16 +94,14 @@ static inline void hx_foot_paths_reset(const hxFootPathsModel *model, hxFootPath
   rest(model, model->home, paths, feet);
 }
 
-/* Returns the stance position that the steps of a leg aim at, walking frame
- * (C53). */
+/* Returns the stance position that the steps of a leg aim at, walking frame (C53). */
 static inline hxPlane aims(const hxFootPathsModel *model, const hxFootPaths *paths, int leg) {
   return hx_plane_add(model->home[leg], hx_scaled(model->inward[leg], paths->narrowing));
 }
 
-/* Lets feet that are in their stance positions skip their steps. Returns
- * whether all feet stand there. swung: legs that were in the air until now;
- * place: positions of the feet; those that have just landed are at their goals.
- */
+/* Lets feet that are in their stance positions skip their steps. Returns whether all feet stand
+ * there. swung: legs that were in the air until now; place: positions of the feet; those that have
+ * just landed are at their goals. */
 static inline int come_home(const hxFootPathsModel *model, const int swung[HX_LEGS],
                             const hxPlannedFeet *now, hxFootPaths *paths, hxPlane place[HX_LEGS]) {
   int home[HX_LEGS];
@@ -128,9 +120,8 @@ static inline hxPlane ground_of(const hxPlannedFeet *feet, int leg) {
   return hx_plane_sub(feet->goal[leg], hx_scaled(feet->pull[leg], 1.0 - feet->blend[leg]));
 }
 
-/* Computes position and velocity of a foot with known phase, goal, pull and
- * frame (C5 to C8). carried: its position on the ground at the previous step;
- * back: e^(-i turn). */
+/* Computes position and velocity of a foot with known phase, goal, pull and frame (C5 to C8).
+ * carried: its position on the ground at the previous step; back: e^(-i turn). */
 static inline void place_foot(const hxFootPathsModel *model, const hxFootPaths *paths, int leg,
                               hxPlane back, hxPlane carried, hxPlannedFeet *feet) {
   const double tau = hx_gait_clock_progress(&model->clock, feet->phase[leg]),
@@ -150,8 +141,7 @@ static inline void place_foot(const hxFootPathsModel *model, const hxFootPaths *
   feet->rise[leg] = paths->clock.swinging[leg] ? climb * pace : 0.0;
 }
 
-/* Computes the present step again, with those legs in the air that swing in the
- * section. */
+/* Computes the present step again, with those legs in the air that swing in the section. */
 static inline void set_out(const hxFootPathsModel *model, const hxFootPaths *paths,
                            const hxPlannedFeet *now, hxTwist twist, hxPlannedFeet *first) {
   const hxPlannedFeet present = *now;
@@ -172,10 +162,9 @@ static inline void set_out(const hxFootPathsModel *model, const hxFootPaths *pat
   }
 }
 
-/* Begins a new section after the present step. first: the feet at that step;
- * number: periods since the last section began; twist: of the body now; going:
- * the body moves or is commanded to; otherwise the feet step to their stance
- * positions and the gait clock stops. */
+/* Begins a new section after the present step. first: the feet at that step; number: periods since
+ * the last section began; twist: of the body now; going: the body moves or is commanded to;
+ * otherwise the feet step to their stance positions and the gait clock stops. */
 static inline void hx_foot_paths_plan(const hxFootPathsModel *model, const hxPlannedFeet *now,
                                       int64_t number, int going, hxTwist twist, hxFootPaths *paths,
                                       hxPlannedFeet *first) {
@@ -197,8 +186,8 @@ static inline void hx_foot_paths_plan(const hxFootPathsModel *model, const hxPla
   set_out(model, paths, now, twist, first);
 }
 
-/* Begins a section in which the gait clock stands still while the body moves on
- * (C50). Arguments are those of hx_foot_paths_plan. */
+/* Begins a section in which the gait clock stands still while the body moves on (C50). Arguments
+ * are those of hx_foot_paths_plan. */
 static inline void hx_foot_paths_hold(const hxFootPathsModel *model, const hxPlannedFeet *now,
                                       int64_t number, hxTwist twist, hxFootPaths *paths,
                                       hxPlannedFeet *first) {
@@ -206,8 +195,8 @@ static inline void hx_foot_paths_hold(const hxFootPathsModel *model, const hxPla
   set_out(model, paths, now, twist, first);
 }
 
-/* Returns how far the farthest foot will be from its stance position at its
- * lift-off [m] (C55). begin: phases at the begin of the walk [cycles]. */
+/* Returns how far the farthest foot will be from its stance position at its lift-off [m] (C55).
+ * begin: phases at the begin of the walk [cycles]. */
 HX_SELDOM static double farthest(const hxFootPathsModel *model, const hxFootPaths *paths,
                                  const hxPlannedFeet *feet, const double begin[HX_LEGS]) {
   const hxPlane v = feet->twist.velocity;
@@ -224,9 +213,9 @@ HX_SELDOM static double farthest(const hxFootPathsModel *model, const hxFootPath
   return largest;
 }
 
-/* Begins the walk anew with feet that stand under a moving body (C55): sets the
- * phases of the legs in the model so that one leg begins to give up its load,
- * the first of those with which the farthest foot goes least far. */
+/* Begins the walk anew with feet that stand under a moving body (C55): sets the phases of the legs
+ * in the model so that one leg begins to give up its load, the first of those with which the
+ * farthest foot goes least far. */
 static HX_SELDOM void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *paths,
                                          hxPlannedFeet *feet) {
   hxGaitClockModel *clock = &model->clock;
@@ -256,8 +245,7 @@ static inline hxPlane landing(const hxFootPathsModel *model, const hxFootPaths *
                       travel(twist, ahead));
 }
 
-/* Computes displacement and turn of the walking frame since the start of the
- * walk (C3). */
+/* Computes displacement and turn of the walking frame since the start of the walk (C3). */
 static inline void odometry(double period, const hxPlannedFeet *before, hxTwist twist,
                             hxPlannedFeet *feet) {
   const hxTwist *last = &before->twist;
@@ -268,8 +256,7 @@ static inline void odometry(double period, const hxPlannedFeet *before, hxTwist 
   feet->twist = twist;
 }
 
-/* Computes the feet a number of periods after the first step of the section,
- * from the step before.
+/* Computes the feet a number of periods after the first step of the section, from the step before.
  */
 static inline void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFootPaths *paths,
                                       int64_t number, hxTwist twist, const hxPlannedFeet *before,

@@ -1,14 +1,12 @@
-/* gait.h - which legs are in the air at which time (C2). Python:
- * controller/walk/gait.py. */
+/* gait.h - which legs are in the air at which time (C2). Python: controller/walk/gait.py. */
 #ifndef HX_GAIT_H
 #define HX_GAIT_H
 
 #include "hexapod/controller.h"
 
-/* Timing of a gait in whole numbers, as in OpenSHC: a cycle has stance + swing
- * parts; the phase offset of a leg is its multiplier times `offset`.
- * Multipliers are ordered around the robot, from the front right to the front
- * left leg. */
+/* Timing of a gait in whole numbers, as in OpenSHC: a cycle has stance + swing parts; the phase
+ * offset of a leg is its multiplier times `offset`. Multipliers are ordered around the robot, from
+ * the front right to the front left leg. */
 typedef struct {
   int stance, swing, offset, multiplier[HX_LEGS];
 } hxTiming;
@@ -35,8 +33,7 @@ static inline void hx_gait_offsets(const hxGait *gait, double offset[HX_LEGS]) {
   }
 }
 
-/* Returns a clock at which the legs of the largest offset are about to lift
- * off. */
+/* Returns a clock at which the legs of the largest offset are about to lift off. */
 static inline double hx_gait_start_clock(const hxGait *gait, const double offset[HX_LEGS]) {
   double largest = offset[0];
   for (int leg = 1; leg < HX_LEGS; ++leg) largest = offset[leg] > largest ? offset[leg] : largest;

@@ -1,5 +1,5 @@
-/* hold.h - slow loops that correct the torso's posture and path from the
- * positions of the standing feet. Python: controller/walk/hold.py. */
+/* hold.h - slow loops that correct the torso's posture and path from the positions of the standing
+ * feet. Python: controller/walk/hold.py. */
 #ifndef HX_HOLD_H
 #define HX_HOLD_H
 
@@ -47,8 +47,8 @@ static const double loaded_from = 0.4;
 static const double determinant_floor = 1e-6;       /* m4, feet on one line define no plane */
 static const double whole_turn = 6.283185307179586; /* rad */
 
-/* Fits the plane height = c + s_x x + s_y y of least weighted squares (C37):
- * fit = c, s_x, s_y. Returns whether the feet define a plane. */
+/* Fits the plane height = c + s_x x + s_y y of least weighted squares (C37): fit = c, s_x, s_y.
+ * Returns whether the feet define a plane. */
 static inline int fit_plane(const hxSight *seen, double fit[3]) {
   double total = 0.0, x0 = 0.0, y0 = 0.0, z0 = 0.0, xx = 0.0, yy = 0.0, xy = 0.0, xz = 0.0,
          yz = 0.0;
@@ -105,8 +105,7 @@ static inline void hx_hold_compile(const hxControllerDefinition *definition, hxH
 static inline void hold_posture(const hxHoldModel *model, const hxSight *seen, hxHold *hold) {
   double fit[3];
   if (!fit_plane(seen, fit)) return;
-  /* relative to the planned feet the torso is pitched by s_x and rolled by -s_y
-   */
+  /* relative to the planned feet the torso is pitched by s_x and rolled by -s_y */
   const double leaning[2] = {seen->tilt[0] + fit[2], seen->tilt[1] - fit[1]};
   for (int i = 0; i < 2; ++i) {
     const double ground = hold->ground_known ? hold->ground[i] : leaning[i];
@@ -123,8 +122,7 @@ static inline void hold_posture(const hxHoldModel *model, const hxSight *seen, h
                       seen->planned[leg].y * hold->angle[0] - hold->height;
 }
 
-/* Adds the displacement and heading lost since the last update (C39). foot:
- * turned by the yaw [m].
+/* Adds the displacement and heading lost since the last update (C39). foot: turned by the yaw [m].
  */
 static inline void add_lost_way(const hxHoldModel *model, const hxSight *seen,
                                 const hxPlane foot[HX_LEGS], hxHold *hold) {

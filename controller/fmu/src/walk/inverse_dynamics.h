@@ -1,5 +1,5 @@
-/* inverse_dynamics.h - torques and ground forces that the planned motion
- * requires. Python: controller/walk/inverse_dynamics.py. */
+/* inverse_dynamics.h - torques and ground forces that the planned motion requires. Python:
+ * controller/walk/inverse_dynamics.py. */
 #ifndef HX_INVERSE_DYNAMICS_H
 #define HX_INVERSE_DYNAMICS_H
 
@@ -16,8 +16,8 @@ typedef struct hxInverseDynamics {
   hxPlane torso_com;
   double torso_com_z;
   double mass[HX_LEGS][HX_JOINTS];
-  hxPlane com[HX_LEGS][HX_JOINTS]; /* m   along the link and up, from its joint,
-                                      in the leg's plane */
+  hxPlane com[HX_LEGS]
+             [HX_JOINTS]; /* m   along the link and up, from its joint, in the leg's plane */
   double side[HX_LEGS][HX_JOINTS]; /* m   Y of the mass points */
   double yaw_inertia[HX_LEGS];     /* kg m2  of all links about the vertical */
   double pitch_inertia[HX_LEGS][HX_JOINTS];
@@ -28,8 +28,7 @@ typedef struct hxMasses {
   hxPlane point[HX_LEGS][HX_JOINTS];  /* m   U, from where the coxa axis meets the hip */
   hxPlane place[HX_LEGS][HX_JOINTS];  /* m   walking frame */
   double height[HX_LEGS][HX_JOINTS];  /* m */
-  hxPlane ground[HX_LEGS][HX_JOINTS]; /* m, relative to the ground, from the
-                                         start of the walk */
+  hxPlane ground[HX_LEGS][HX_JOINTS]; /* m, relative to the ground, from the start of the walk */
   hxPlane torso_place, torso_ground;  /* m */
   double torso_height;                /* m */
   hxPlane turn;                       /* 1   e^(i yaw) of the walking frame */
@@ -37,19 +36,17 @@ typedef struct hxMasses {
 
 /* Torques and ground forces that a planned motion requires at one step. */
 typedef struct hxDemand {
-  double torque[HX_LEGS][HX_JOINTS];   /* N m  of the joints for the legs' own
-                                          weight and motion, their feet free */
-  double lever[HX_LEGS][HX_JOINTS][3]; /* m    J^T: joint torques per force on
-                                          the contact point, walking frame */
-  hxPlane push;   /* N    horizontal force the ground must give the robot, walking
-                     frame */
-  double weight;  /* N, vertical force of the ground */
-  hxPlane moment; /* N m, sum of p f_n over the feet */
-  double twist;   /* N m, sum of Im(p^* f_h), the moment about the vertical */
+  double torque[HX_LEGS][HX_JOINTS]; /* N m  of the joints for the legs' own weight and motion,
+                                        their feet free */
+  double lever[HX_LEGS][HX_JOINTS]
+              [3]; /* m    J^T: joint torques per force on the contact point, walking frame */
+  hxPlane push;    /* N    horizontal force the ground must give the robot, walking frame */
+  double weight;   /* N, vertical force of the ground */
+  hxPlane moment;  /* N m, sum of p f_n over the feet */
+  double twist;    /* N m, sum of Im(p^* f_h), the moment about the vertical */
 } hxDemand;
 
-/* Three successive steps. Without one of the neighbours the present step has no
- * acceleration. */
+/* Three successive steps. Without one of the neighbours the present step has no acceleration. */
 typedef struct hxNeighbours {
   const hxMasses *masses[3]; /* before, now, after */
   const hxPose *pose[3];     /* of all legs */
@@ -90,8 +87,7 @@ static inline void hx_inverse_dynamics_compile(const hxControllerDefinition *def
   model->floor = sum / HX_LEGS - definition->foot_radius;
 }
 
-/* -------------------------------------------------------------------------------------
- * places */
+/* ------------------------------------------------------------------------------------- places */
 
 static inline void hx_inverse_dynamics_place(const hxInverseDynamics *model,
                                              const hxLegSolver leg[HX_LEGS],
@@ -126,8 +122,7 @@ static inline void hx_inverse_dynamics_place(const hxInverseDynamics *model,
   masses->torso_ground = hx_plane_add(way, hx_times(masses->turn, masses->torso_place));
 }
 
-/* -------------------------------------------------------------------------------------
- * forces */
+/* ------------------------------------------------------------------------------------- forces */
 
 /* Returns the second difference of three steps. */
 static inline double acceleration(double before, double now, double after, double period) {
@@ -140,8 +135,7 @@ static inline hxPlane plane_acceleration(hxPlane before, hxPlane now, hxPlane af
                   acceleration(before.y, now.y, after.y, period));
 }
 
-/* Adds m (a + g) of a point, walking frame, to the demand on the ground (C16).
- */
+/* Adds m (a + g) of a point, walking frame, to the demand on the ground (C16). */
 static inline void add_force(hxPlane push, double lift, hxPlane place, double height, double floor,
                              hxDemand *demand) {
   demand->push = hx_plane_add(demand->push, push);
@@ -170,8 +164,8 @@ static inline void demand_torso(const hxInverseDynamics *model, const hxNeighbou
   demand->twist += model->torso_inertia * hx_across(now->turn, spin);
 }
 
-/* Adds m (a + g) of the links of a leg to the demand (C16, C56), and returns it
- * in the torso frame. */
+/* Adds m (a + g) of the links of a leg to the demand (C16, C56), and returns it in the torso
+ * frame. */
 static inline void demand_links(const hxInverseDynamics *model, const hxNeighbours *motion, int leg,
                                 const hxPosture *posture, double laden, hxPlane push[HX_JOINTS],
                                 double lift[HX_JOINTS], hxDemand *demand) {
@@ -194,8 +188,8 @@ static inline void demand_links(const hxInverseDynamics *model, const hxNeighbou
   }
 }
 
-/* Computes the joint torques of a leg (C15) from the forces on its links, torso
- * frame. rubs: share of the gears' dry friction that acts. */
+/* Computes the joint torques of a leg (C15) from the forces on its links, torso frame. rubs: share
+ * of the gears' dry friction that acts. */
 static inline void demand_torques(const hxInverseDynamics *model, const hxLegSolver *leg,
                                   const hxNeighbours *motion, int k, const hxPlane push[HX_JOINTS],
                                   const double lift[HX_JOINTS], const double rubs[HX_JOINTS],
@@ -244,9 +238,8 @@ static inline void lever_of(const hxLegSolver *leg, const hxPose *pose, const hx
   }
 }
 
-/* laden: measured over modelled weight [1]. The planned loads are scaled by it
- * (C30), but a payload needs no push for the legs, and more for the torso
- * (C56). */
+/* laden: measured over modelled weight [1]. The planned loads are scaled by it (C30), but a payload
+ * needs no push for the legs, and more for the torso (C56). */
 static inline void
 hx_inverse_dynamics_demand(const hxInverseDynamics *model, const hxLegSolver leg[HX_LEGS],
                            const hxNeighbours *motion, const double speed[HX_LEGS][HX_JOINTS],

@@ -87,8 +87,7 @@ static inline void hx_leg_solver_forward(const hxLegSolver *model, const double 
   foot[2] = z + model->hip[2];
 }
 
-/* Returns how far the spherical foot has rolled outwards since the stance (C9)
- * [m]. */
+/* Returns how far the spherical foot has rolled outwards since the stance (C9) [m]. */
 static inline double hx_leg_solver_rolling(const hxLegSolver *model,
                                            const double angle[HX_JOINTS]) {
   return model->radius * (angle[2] - angle[1] - model->stance_pitch);
@@ -110,8 +109,7 @@ static inline void linkage(const hxLegSolver *model, hxPlane plane, double heigh
   pose->point = point;
   pose->heading = hx_over(point, hx_plane(rho, side));
   pose->foot = hx_plane(rho - model->coxa_length, height - model->hip[2] - model->coxa_height);
-  /* cos gamma = (u^2 + w^2 - a^2 - b^2)/(2 a b);  e^(i B) = (u + i w)/(b + a
-   * e^(i gamma)) */
+  /* cos gamma = (u^2 + w^2 - a^2 - b^2)/(2 a b);  e^(i B) = (u + i w)/(b + a e^(i gamma)) */
   const double wanted = (hx_square(pose->foot) - a * a - b * b) / (2.0 * a * b);
   const double cosine = hx_clamp(wanted, folded_cosine, 1.0);
   const hxPlane knee = hx_plane(cosine, sqrt(1.0 - cosine * cosine));
@@ -132,8 +130,7 @@ static inline void give_angles(const hxLegSolver *model, const double angle[HX_J
   pose->angle[2] = angle[2] - model->femur_tilt + model->tibia_tilt;
 }
 
-/* Solves the inverse kinematics without joint limits (C12). Every target gives
- * a pose. */
+/* Solves the inverse kinematics without joint limits (C12). Every target gives a pose. */
 static inline void hx_leg_solver_pose(const hxLegSolver *model, hxPlane plane, double height,
                                       hxPose *pose) {
   double angle[HX_JOINTS];
@@ -158,8 +155,7 @@ static inline void hx_leg_solver_poses(const hxLegSolver model[HX_LEGS],
   for (int k = 0; k < HX_LEGS; ++k) give_angles(&model[k], angle[k], &pose[k]);
 }
 
-/* Computes the joint speeds [rad/s] of a foot with this velocity, torso frame
- * [m/s] (C13). */
+/* Computes the joint speeds [rad/s] of a foot with this velocity, torso frame [m/s] (C13). */
 static inline void hx_leg_solver_speeds(const hxLegSolver *model, const hxPose *pose,
                                         hxPlane velocity, double rise, double speed[HX_JOINTS]) {
   const hxPlane v = hx_times(velocity, hx_conj(pose->heading));
@@ -172,8 +168,8 @@ static inline void hx_leg_solver_speeds(const hxLegSolver *model, const hxPose *
   speed[2] = hx_along(left, pose->foot) / (lever * model->tibia);
 }
 
-/* Limits angles to the joints' limits and speeds to those of the servos.
- * Returns whether the foot misses its target. */
+/* Limits angles to the joints' limits and speeds to those of the servos. Returns whether the foot
+ * misses its target. */
 static inline int hx_leg_solver_solve(const hxLegSolver *model, const hxPose *pose,
                                       hxPlane velocity, double rise, double angle[HX_JOINTS],
                                       double speed[HX_JOINTS]) {
@@ -189,11 +185,10 @@ static inline int hx_leg_solver_solve(const hxLegSolver *model, const hxPose *po
   return missed;
 }
 
-/* Computes the joint accelerations [rad/s2] that lead to the angles of a
- * neighbouring step (C14). ahead: time to the neighbour [s], negative for the
- * previous step; without a neighbour they are 0. A joint at a limit of angle or
- * speed has none. None is larger than that which reverses the largest speed
- * within this time. */
+/* Computes the joint accelerations [rad/s2] that lead to the angles of a neighbouring step (C14).
+ * ahead: time to the neighbour [s], negative for the previous step; without a neighbour they are 0.
+ * A joint at a limit of angle or speed has none. None is larger than that which reverses the
+ * largest speed within this time. */
 static inline void hx_leg_solver_accelerations(const hxLegSolver *model, const hxPose *neighbour,
                                                double ahead, const double angle[HX_JOINTS],
                                                const double speed[HX_JOINTS],
@@ -211,12 +206,10 @@ static inline void hx_leg_solver_accelerations(const hxLegSolver *model, const h
   }
 }
 
-/* Returns the softness of a leg whose servos have the stiffness kp [N m/rad]
- * (C25). */
+/* Returns the softness of a leg whose servos have the stiffness kp [N m/rad] (C25). */
 static inline hxSoftness hx_leg_solver_softness(const hxLegSolver *model, const hxPose *pose,
                                                 double kp) {
-  /* rates of the foot, outward + i up, by the femur's and by the tibia's joint
-   */
+  /* rates of the foot, outward + i up, by the femur's and by the tibia's joint */
   const hxPlane femur = {-pose->foot.y, pose->foot.x},
                 tibia = {model->tibia * pose->tibia.y, -model->tibia * pose->tibia.x};
   const double reach = pose->foot.x + model->coxa_length;

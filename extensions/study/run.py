@@ -27,8 +27,14 @@ from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import METHOD
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.worker_pool import processor_count
-from hexapod_cosim.extensions.study import tables
-from hexapod_cosim.extensions.study.dispatch import ProgressSink, ResultSink, dispatch
+from hexapod_cosim.extensions.study.dispatch import (
+    ProgressSink,
+    ResultSink,
+    Workers,
+    cluster_workers,
+    dispatch,
+    local_workers,
+)
 from hexapod_cosim.extensions.study.folder import (
     RESULTS,
     begin_folder,
@@ -36,21 +42,21 @@ from hexapod_cosim.extensions.study.folder import (
     finish_folder,
     locked,
 )
-from hexapod_cosim.extensions.study.job import Job, make_job, manifest_of
-from hexapod_cosim.extensions.study.page import notes, write_study_report
+from hexapod_cosim.extensions.study.job import make_job, manifest_of
+from hexapod_cosim.extensions.study.orders import count_runs, sweep_orders
+from hexapod_cosim.extensions.study.page import (
+    Table,
+    failure_table,
+    notes,
+    optimum_tables,
+    overall_table,
+    write_study_report,
+)
 from hexapod_cosim.extensions.study.reading import load_study
 from hexapod_cosim.extensions.study.records import Study
-from hexapod_cosim.extensions.study.runs import Sweep, count_runs
 from hexapod_cosim.extensions.study.search import optimise
 from hexapod_cosim.extensions.study.store import Store
 from hexapod_cosim.extensions.study.summary import Results, read_results, summary_of
-from hexapod_cosim.extensions.study.workers import (
-    EventSink,
-    Workers,
-    cluster_workers,
-    in_process_workers,
-    local_workers,
-)
 
 MAX_REASONS = 10  # of failures that are shown
 # gets the numbers of all runs and of those that are done, and returns the display of progress
@@ -67,7 +73,6 @@ class Options:
     workers: int | None = None
     scheduler: str | None = None  # address of a Dask scheduler that replaces the processes
     command: str = ""  # command line that repeats the study, for its report
-    events: EventSink = lambda _text: None  # for instance that the study waits for workers
     runner: type[Runner] = Runner  # a class that workers can import
 
 
@@ -84,32 +89,29 @@ def run_study(study: Study, folder: Path, *, options: Options, start: StartProgr
         The file of results.
     """
     count = count_runs(study)
-    with locked(folder):
-        job = make_job(study, fmu=options.fmu, gains=options.gains, runner=options.runner)
-        begin_folder(folder, manifest_of(job, runs=count), command=options.command)
-        with closing(Store(folder, study)) as store:
-            done = store.done(count)
-            sink = ResultSink(study, store, start(count, int(np.count_nonzero(done))))
+    job = make_job(study, fmu=options.fmu, gains=options.gains, runner=options.runner)
+    begin_folder(folder, manifest_of(study, job, runs=count), command=options.command)
+    with locked(folder), closing(Store(folder, study)) as store:
+        missing = np.flatnonzero(~store.done(count))
+        done = count - len(missing)
+        sink = ResultSink(job, store, start(count, done), done)
+        with open_workers(options, count) as workers:
             if study.optimise is not None:
-                with open_workers(job, options, count) as workers:
-                    optimise(sink, workers, folder)
-            elif not done.all():
-                missing = np.flatnonzero(~done)
-                orders = Sweep(study).orders(map(int, missing))
-                with open_workers(job, options, count) as workers:
-                    dispatch(sink, workers, orders, len(missing))
-            export_runs(store, folder)
-        finish_folder(folder)
+                optimise(study, sink, workers, folder)
+            else:
+                orders = sweep_orders(study, map(int, missing))
+                dispatch(sink, workers, orders, len(missing))
+        export_runs(store, folder)
+    finish_folder(folder)
     return folder / RESULTS
 
 
-def open_workers(job: Job, options: Options, count: int) -> AbstractContextManager[Workers]:
+def open_workers(options: Options, count: int) -> AbstractContextManager[Workers]:
     """Opens the workers that the options ask for, for a number of runs."""
     if options.scheduler is not None:
-        return cluster_workers(job, options.scheduler, options.events)
-    if options.workers == 0:
-        return in_process_workers(job)
-    return local_workers(job, min(options.workers or processor_count(), count))
+        return cluster_workers(options.scheduler)
+    wanted = processor_count() if options.workers is None else options.workers
+    return local_workers(min(wanted, count))
 
 
 def run_and_report(
@@ -130,33 +132,26 @@ def run_and_report(
         warn(f"stopped; the runs so far are in {folder}, and the same command resumes the study")
         raise
     found, files = report_on(folder)
-    warn_of(found)
     if json:
         show_json({**summary_of(found), "results": str(results), "report": str(files[-1])})
     else:
         show_study(found)
         show_files([results, *files])
         print(f"report: {files[-1]}")
-    return FELL if _only_falls(found) else SUCCESS
-
-
-def _only_falls(found: Results) -> bool:
-    """Returns whether no run walked to its end and the robot fell in some of them."""
-    return not any(found.overall.walked.values()) and any(
-        status == COMPLETED for _, status, _ in found.failures
-    )
-
-
-def warn_of(found: Results) -> None:
-    """Prints the notes of the report as warnings."""
-    for text in notes(found):
-        warn(text)
+    fell = any(status == COMPLETED for _, status, _ in found.failures)
+    return FELL if fell and not any(found.overall.walked.values()) else SUCCESS
 
 
 def report_on(folder: Path) -> tuple[Results, list[Path]]:
-    """Reads a study's folder and writes its tables and report; returns the results and files."""
+    """Reads a study's folder, writes its tables and report, and prints the notes as warnings.
+
+    Returns the results and the files.
+    """
     found = read_results(folder)
-    return found, write_study_report(found, folder)
+    files = write_study_report(found, folder)
+    for text in notes(found):
+        warn(text)
+    return found, files
 
 
 @contextmanager
@@ -173,14 +168,7 @@ def progress(*, plain: bool) -> Iterator[StartProgress]:
                 print(f"resumed: {done} of {total} runs are there already", file=sys.stderr)
             show = shown.enter_context(counting_bar("runs", total, plain=plain))
             show(done, 0)
-            count, failed = done, 0
-
-            def add(more: int, lost: int) -> None:
-                nonlocal count, failed
-                count, failed = count + more, failed + lost
-                show(count, failed)
-
-            return add
+            return show
 
         yield start
 
@@ -188,19 +176,18 @@ def progress(*, plain: bool) -> Iterator[StartProgress]:
 def show_study(found: Results) -> None:
     """Prints the table of all runs, totals, failures by reason and the optimum."""
     overall, controls = found.overall, found.study.controls
-    _show(tables.overall_table(found))
+    _show(overall_table(found))
     walked = ", ".join(
         f"{control} {overall.walked[control]} of {overall.runs[control]}" for control in controls
     )
     show_text(f"{found.runs} runs at {found.of_points} points; walked to the end: {walked}")
     if len(controls) > 1:
         show_text(f"{METHOD}.")
-    for count, control, how, reason in tables.failure_table(found).rows[:MAX_REASONS]:
+    for count, control, how, reason in failure_table(found).rows[:MAX_REASONS]:
         show_text(f"{count:>6} x {control} {how}: {reason}")
-    if found.optimum is not None:
-        _show(tables.optimum_table(found))
-        _show(tables.optimum_changes(found))
+    for table in optimum_tables(found):
+        _show(table)
 
 
-def _show(table: tables.Table) -> None:
+def _show(table: Table) -> None:
     show_table(table.columns, table.rows, right=table.right)
