@@ -60,6 +60,8 @@ class Schedule:
     # of the joints' sensors (18, leg by leg), of the attitude sensor (1)
     angle_faults: SensorFaults | None = None
     attitude_faults: SensorFaults | None = None
+    # parameters that change: the step before which they do, name and value, in order
+    tunings: tuple[tuple[int, str, float], ...] = ()
 
     @cached_property
     def commands(self) -> tuple[BodyCommand, ...]:
@@ -93,6 +95,10 @@ def make_schedule(scenario: Scenario) -> Schedule:
         lost_rows(scenario.lost, times) if scenario.lost else None,
         angle,
         attitude,
+        tuple(
+            (int(np.searchsorted(begins, event.time - ROUND_OFF)), event.parameter, event.value)
+            for event in scenario.tunings
+        ),
     )
 
 

@@ -6,8 +6,7 @@ controller FMU; all others run as in `simulate`.
 
 Changes while the robot walks:
 
-- friction: the plant begins again in its present pose and motion, on ground of the new friction.
-  Bristles of the friction laws and the measures of work and slip begin at zero.
+- friction: a tunable parameter of the plant.
 - control, from a built-in one to another: it goes on in the present phase of the walk at once.
 - gait of a built-in control: the robot walks on slowly meanwhile (`settings.py`).
 - ground, and control or gait where a controller of the user walks: the robot is placed at its
@@ -55,7 +54,6 @@ from hexapod_cosim.extensions.live.settings import (
 from hexapod_cosim.models import LEG_NAMES, HexapodError
 
 HORIZON = 1e6  # s    stop time of the FMUs
-STATE = "initial."  # prefix of the plant's parameters for the state at the start
 MOST_WEIGHTS = 3.0  # body weights    largest push
 
 
@@ -179,7 +177,8 @@ class LiveRobot(Closing):
         if self.stopped or change.key == "ground":
             self.place(wanted)
         elif change.key == "friction":
-            self._change_friction(wanted, plan)
+            self._plant.set_parameters({"friction.mu": wanted.friction})
+            self.settings, self.plan = replace(self.settings, friction=wanted.friction), plan
         elif self.fault or not _can_go_on(self.plan, plan):
             self.place(wanted)
         elif change.key == "control":
@@ -191,28 +190,6 @@ class LiveRobot(Closing):
     def _plan_of(self, settings: Settings) -> RunPlan:
         scenario = self.choices.scenario_with(settings)
         return make_plan(scenario, gains=self._gains if _is_built_in(scenario.control) else None)
-
-    def _change_friction(self, wanted: Settings, plan: RunPlan) -> None:
-        """Starts the plant again in its present state with another friction."""
-        self.settings, self.plan = replace(self.settings, friction=wanted.friction), plan
-        state = self._state()
-        self._plant.reset()
-        apply_settings(self._plant, plan.robot)
-        self._plant.set_parameters({**plan.scenario.parameters, **state})
-        self._plant.initialise(self.time, HORIZON)
-        self.signals.read()
-
-    def _state(self) -> dict[str, float]:
-        """Returns the plant's pose and motion as the parameters of a start."""
-        present = dict(zip(self.signals.names, self.signals.values.tolist(), strict=True))
-        own = {
-            name: name.removeprefix(STATE)
-            for name in self._plant.variables
-            if name.startswith(STATE)
-        }
-        return {
-            name: present[key if key in present else f"torso.{key}"] for name, key in own.items()
-        }
 
     def _tune(self, plan: RunPlan, prefix: str) -> None:
         """Sets the parameters of the controller FMU whose names begin with a prefix."""

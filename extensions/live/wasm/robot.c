@@ -159,12 +159,8 @@ HX_API int hx_page_leg(int leg) {
 /* Changes the control while the robot walks. */
 HX_API int hx_page_control(int next) { return hx_controller_change_control(controller, next); }
 
-/* Changes the friction coefficient: the plant begins again in its present pose and motion, with
- * which its coordinates begin as well. */
+/* Changes the friction coefficient while the robot walks. */
 HX_API int hx_page_friction(double friction) {
-  hxCoordinates present;
-  hx_plant_get_coordinates(plant, &present);
-  memcpy(&definition.initial, &present, sizeof definition.initial);
   definition.friction.mu = friction;
-  return hx_plant_reset(plant, &definition, hx_plant_time(plant));
+  return hx_plant_tune(plant, &definition);
 }
