@@ -33,7 +33,7 @@ from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError
 
 WALKS = "walks"  # key of run.json
-SEEDS, SEEDS_PARTIAL = "seeds.csv", "seeds.partial.csv"
+SEEDS = "seeds.csv"
 FACTS = tuple(item.name for item in fields(Summary) if item.name != "metrics")
 SEPARATOR = " | "  # between the warnings of a run in one cell
 
