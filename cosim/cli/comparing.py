@@ -201,40 +201,6 @@ def run_work(work: Work, path: Path) -> Done:
     return Done(results, comparison, checked, files, files[-1])
 
 
-<<<<<<< HEAD
-def _compare_many(works: Sequence[Work], names: Sequence[str], path: Path, *, as_json: bool) -> int:
-    """Runs comparisons into folders of their own beside a table over all of them."""
-    # imported only here because matplotlib is slow to import
-    from hexapod_cosim.cosim.report import terrains
-
-    rows: list[terrains.Row] = []
-    reports: list[Path] = []
-    lost = False
-    for work, name in zip(works, names, strict=True):
-        place = Path(name).stem
-        try:
-            done = run_work(work, path / place)
-        except RunError as error:
-            warn(f"{place}: {error}")
-            lost = True
-            continue
-        rows += terrains.terrain_rows(place, done.comparison)
-        reports += [] if done.report is None else [done.report]
-        lost = lost or bool(done.comparison.losses)
-    files = terrains.write_terrains(rows, path) if rows else []
-    if as_json:
-        show_json({"rows": rows, "reports": [str(report) for report in reports]})
-        return FELL if lost else SUCCESS
-    columns = terrains.table_columns(rows)
-    show_table(list(columns), zip(*columns.values(), strict=True), right=range(2, len(columns)))
-    show_files(files)
-    if reports:
-        show_text("\n".join(f"report: {report}" for report in reports))
-    return FELL if lost else SUCCESS
-
-
-=======
->>>>>>> main
 def _show(done: Done, walks: Sequence[str]) -> None:
     """Prints the metrics of all controls, their accuracy if it was checked, walks and files."""
     comparison, checked = done.comparison, done.checked
