@@ -128,7 +128,7 @@ class ServoFault:
     """A fault of a joint's servo from `time` [s from the start of the run].
 
     A weak servo gives a share of its largest torque, a limp one none; a locked joint stays at the
-    angle that it has when the fault begins (the plant's inputs `strength` and `lock`).
+    angle that it has when the fault begins (the plant's inputs `weakness` and `lock`).
     """
 
     time: Annotated[float, Number("s", at_least=0.0)]
@@ -153,8 +153,17 @@ class Lost:
     lost: Annotated[str, Choice(LOST)]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """A tunable parameter of the plant FMU that has a new value from `time` [s from the start]."""
+
+    time: Annotated[float, Number("s", at_least=0.0)]
+    parameter: Annotated[str, Text()]
+    value: Annotated[float, Number("")]
+
+
 SensorFault = Fault | AngleFault | AttitudeFault
-Event = Push | SensorFault | ServoFault | Lost
+Event = Push | SensorFault | ServoFault | Lost | Tuning
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -276,6 +285,12 @@ class Scenario:
     def servo_faults(self) -> tuple[ServoFault, ...]:
         """The events that are faults of servos."""
         return tuple(event for event in self.events if isinstance(event, ServoFault))
+
+    @property
+    def tunings(self) -> tuple[Tuning, ...]:
+        """The events that change parameters, in order of time."""
+        found = [event for event in self.events if isinstance(event, Tuning)]
+        return tuple(sorted(found, key=lambda event: event.time))
 
     @property
     def lost(self) -> tuple[Lost, ...]:

@@ -14,6 +14,7 @@ from hexapod_cosim.cosim.report.page import embedded, render
 from hexapod_cosim.cosim.report.tables import number, shown_change
 from hexapod_cosim.cosim.results.comparison import METHOD
 from hexapod_cosim.cosim.results.metric_table import DUST, FLOORS, METRICS, shown_metrics
+from hexapod_cosim.cosim.results.summary import balance_warnings
 from hexapod_cosim.extensions.study.figures import drawing_of, save
 from hexapod_cosim.extensions.study.records import WALKED, shown_value
 from hexapod_cosim.extensions.study.store import FIGURES
@@ -207,4 +208,4 @@ def notes(results: Results) -> Iterator[str]:
             )
         elif walked and not results.figured[control]:
             yield f"All {walked} {control} walks are {TOO_SHORT}"
-        yield from results.unbalanced[control].warnings(control, runs=total)
+        yield from balance_warnings(control, results.residuals[control], runs=total)

@@ -241,6 +241,22 @@ void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactSta
   if (hx_has_cells(model)) hold_cells(model, depths, contact);
 }
 
+void hx_contact_tune(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
+  for (int k = 0; k < model->listed; ++k) {
+    const int row = model->row[k];
+    for (int slot = 0; slot < hx_slots_of(row); ++slot) {
+      const double *material = material_under(model, depths, row, slot);
+      const double impact_speed = contact->impact_speed[row][slot];
+      if (contact->closed[row][slot] == 0.0) continue;
+      set_ground(model, material, row, slot, contact);
+      contact->damping[row][slot] = hx_contact(model->contact_law)->damping(model, impact_speed);
+      if (hx_may_sink(row) && contact->on_soil[hx_soil_row(row)][slot] != 0.0 && row != HX_TORSO)
+        set_soil(model, material, row, slot, hx_soil_shape(row, 0), contact);
+    }
+    fill_contact_slots(contact, row);
+  }
+}
+
 void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion) {
   for (int i = 0; i < 3; ++i) {
     for (int leg = 0; leg < HX_LEGS; ++leg)

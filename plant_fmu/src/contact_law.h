@@ -57,6 +57,10 @@ int hx_contact_cross(const hxModel *model, const hxDepths *depths, hxContactStat
 void hx_contact_hand_over(const hxMoment *before, const hxMoment *after, int crossed,
                           hxContactState *contact);
 
+/* Sets the ground's constants of all contacts to those of a changed model; contacts that are closed
+ * keep their impact speeds. */
+void hx_contact_tune(const hxModel *model, const hxDepths *depths, hxContactState *contact);
+
 /* Sets the bristles of open feet to 0 (eq. 16). */
 void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion);
 

@@ -164,8 +164,8 @@ typedef struct hxCommand {
   double acceleration[HX_JOINTS][HX_SLOTS];
   double time;   /* s  time of the command, from which kinematic drives extrapolate (eq. 13) */
   double supply; /* 1  voltage of the supply over servo.voltage (eq. 53) */
-  double duty[HX_JOINTS][HX_SLOTS]; /* 1  share of the duty limit that heat leaves (eq. 52) */
-  double strength[HX_JOINTS][HX_SLOTS]; /* 1  share of its limits that a motor has */
+  double duty[HX_JOINTS][HX_SLOTS];     /* 1  share of the duty limit that heat leaves (eq. 52) */
+  double weakness[HX_JOINTS][HX_SLOTS]; /* 1  share of its limits that a motor has lost */
 } hxCommand;
 
 /* Commands that servos hold until the bus transmits the next ones, legs innermost. */
@@ -276,6 +276,7 @@ typedef struct hxState {
   double next_step;       /* s  step that the error control proposes next */
   double first_step;      /* s  the same for a call's first step, with new inputs */
   double stored_at_start; /* J  stored energy at the start of the energy audit */
+  double parameter_work;  /* J  given by changes of parameters since */
   double call_start;      /* s  start of the call that an event interrupted */
   double call_input;      /* 1  checksum of its input, a whole number; 0: no such call */
   double supply;          /* 1  hxCommand.supply and duty of the last call */
