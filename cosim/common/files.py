@@ -29,7 +29,6 @@ RESULT_FILES = (
     "results.partial.csv",
     "results.partial.mcap",
     "seeds.csv",
-    "seeds.partial.csv",
     "metrics.json",
     "scenario.toml",
     "ground.terrain",

@@ -16,6 +16,7 @@ from functools import cache, lru_cache
 from types import SimpleNamespace
 from typing import Any
 
+from hexapod_cosim.controller.signals import DEFAULT_PERIOD
 from hexapod_cosim.cosim.common.components import PLANT, Component
 from hexapod_cosim.cosim.common.plant_files import interface_file, package_version
 from hexapod_cosim.cosim.interface.patterns import (
@@ -91,7 +92,7 @@ def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace)
         log_categories=table["log_category"],
         first_reference=table["first_reference"],
         stop_time=table["experiment"]["stop"],
-        step=table["experiment"]["step"],
+        step=table["experiment"].get("step", DEFAULT_PERIOD),
     )
 
 

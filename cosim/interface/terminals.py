@@ -23,6 +23,7 @@ Group = tuple[str, str, tuple[str, ...]]  # name, meaning, members
 LEGS: tuple[Group, ...] = (
     ("command", "joint commands", COMMANDS),
     ("state", "joint states", STATES),
+    ("servo", "faults of the servos", ("strength", "lock")),
 )
 FOOT = "contact of the foot with the ground"
 TORSO: tuple[Group, ...] = (
@@ -60,7 +61,8 @@ def render_terminals(names: Sequence[str]) -> str:
         for name, text, quantities in LEGS:
             members = [f"{joint}{quantity}" for joint in joints for quantity in quantities]
             present = [(f"{start}{one}", one) for one in members if f"{start}{one}" in names]
-            _add(terminal, name, text, present)
+            if present:
+                _add(terminal, name, text, present)
         points = [(one, one.removeprefix(foot)) for one in names if one.startswith(foot)]
         _add(terminal, "foot", FOOT, points)
     torso = _add(terminals, "torso", "what happens to the torso")

@@ -110,14 +110,11 @@ class NativeMaster:
         row = [*outputs, *flags, *SERVOS, *PUSH, *self._drive, *insides]
         self._places = {name: place for place, name in enumerate(row)}
         self._value = np.zeros(len(row) + len(READINGS))
+        everything = [name for name in row if name not in SERVOS]
         self.columns = tuple(
-            [name for name in row if name not in SERVOS]
-            if columns is None
-            else [
-                name
-                for name in columns
-                if name in self._places or not name.startswith("controller.")
-            ]
+            name
+            for name in (everything if columns is None else columns)
+            if name in self._places or not name.startswith("controller.")
         )
         self._judged = judged
         self._plant_inputs: dict[int, Any] = {}  # by the number of values before the drive

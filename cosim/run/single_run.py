@@ -95,25 +95,11 @@ def simulate(
             start_controller(controller, plant, plan)
         if begin is not None:
             begin()
-        outcome = run(
-            plant,
-            signals,
-            controller,
-            plan.schedule,
-            recorder,
-            h=scenario.macro_step,
-            progress=progress,
-        )
-        return make_result(
-            plan,
-            outcome,
-            plant,
-            parameters,
-            engine=PYTHON,
-            law=law,
-            warnings=controller.warnings,
-            surface=run_surface(plant, plan.robot, parameters),
-        )
+        parts = plant, signals, controller, plan.schedule, recorder
+        outcome = run(*parts, h=scenario.macro_step, progress=progress)
+        surface = run_surface(plant, plan.robot, parameters)
+        facts = {"engine": PYTHON, "law": law, "warnings": controller.warnings}
+        return make_result(plan, outcome, plant, parameters, surface=surface, **facts)
 
 
 def start_controller(controller: FmuLaw, plant: Fmu, plan: RunPlan) -> None:

@@ -177,7 +177,7 @@ typedef struct hxCommand {
   double time;   /* s  time of the command, from which kinematic drives extrapolate (eq. 13) */
   double supply; /* 1  voltage of the supply over servo.voltage (eq. 53) */
   double duty[HX_JOINTS][HX_SLOTS];     /* 1  share of the duty limit that heat leaves (eq. 52) */
-  double strength[HX_JOINTS][HX_SLOTS]; /* 1  share of its limits that a motor has */
+  double weakness[HX_JOINTS][HX_SLOTS]; /* 1  share of its limits that a motor has lost */
 } hxCommand;
 
 /* Commands that servos hold until the bus transmits the next ones, legs innermost. */
