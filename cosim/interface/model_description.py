@@ -143,14 +143,15 @@ def add_units(root: Element, units: Iterable[Unit]) -> None:
 
 
 def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterable[Unit]) -> None:
-    """Adds the types of units and enumerations."""
-    parent = SubElement(root, "TypeDefinitions")
+    """Adds the types of units and enumerations, if there are any: the list must not be empty."""
+    parent = Element("TypeDefinitions")
     for unit in units:
         _add_real_type(parent, unit)
     for enumeration in enumerations:
         element = SubElement(SubElement(parent, "SimpleType", name=enumeration.name), "Enumeration")
         for number, (name, text) in enumerate(enumeration.items, start=1):
             SubElement(element, "Item", name=name, value=str(number), description=text)
+    root.extend([parent] if len(parent) else [])
 
 
 def _add_real_type(parent: Element, unit: Unit) -> None:

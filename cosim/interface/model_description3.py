@@ -114,8 +114,8 @@ def _add_interfaces(root: Element, interface: Interface) -> None:
 
 
 def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterable[Unit]) -> None:
-    """Adds the types of enumerations and units."""
-    parent = SubElement(root, "TypeDefinitions")
+    """Adds the types of enumerations and units, if there are any: the list must not be empty."""
+    parent = Element("TypeDefinitions")
     for enumeration in enumerations:
         element = SubElement(parent, "EnumerationType", name=enumeration.name)
         for number, (name, text) in enumerate(enumeration.items, start=1):
@@ -128,6 +128,7 @@ def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterab
                 "Float64Type",
                 {"name": unit.type, "quantity": unit.type, "unit": unit.name} | display,
             )
+    root.extend([parent] if len(parent) else [])
 
 
 def _add_variables(root: Element, interface: Interface, variables: Iterable[Array]) -> None:
