@@ -161,9 +161,7 @@ def read_result(folder: Path) -> StoredResult:
     view = View(read_recording(folder, RESULTS), facts.parameters, facts.gait_period, surface)
     checked = metrics.pop(ACCURACY, None)
     metrics.pop(WARNINGS, None)  # also in run.json
-    accuracy = None
-    if checked is not None:
-        accuracy = accuracy_from_table(checked, where=str(folder / METRICS_FILE))
+    accuracy = None if checked is None else accuracy_from_table(checked)
     return StoredResult(view, metrics, facts, read_scenario(folder), accuracy)
 
 
@@ -256,9 +254,5 @@ def read_accuracies(folder: Path) -> dict[str, Accuracy]:
 
     Raises HexapodError.
     """
-    path = folder / METRICS_FILE
-    table = read_json(path)
-    checked = table.get(ACCURACY, {}) if isinstance(table, dict) else {}
-    return {
-        control: accuracy_from_table(item, where=str(path)) for control, item in checked.items()
-    }
+    checked = read_json(folder / METRICS_FILE).get(ACCURACY, {})
+    return {control: accuracy_from_table(item) for control, item in checked.items()}

@@ -128,7 +128,7 @@ class ServoFault:
     """A fault of a joint's servo from `time` [s from the start of the run].
 
     A weak servo gives a share of its largest torque, a limp one none; a locked joint stays at the
-    angle that it has when the fault begins (the plant's inputs `strength` and `lock`).
+    angle that it has when the fault begins (the plant's inputs `weakness` and `lock`).
     """
 
     time: Annotated[float, Number("s", at_least=0.0)]

@@ -80,11 +80,9 @@ def robot_module() -> bytes:
     if in_source_tree():
         return build_library(Library("robot", _sources(), flags=("-DHX_SHARED",)), BROWSER)
     path = plant_folders()[0] / "browser" / "robot.wasm"
-    if not path.is_file():
-        raise HexapodError(
-            "no WebAssembly module", got="a wheel for one machine", fix="use a clone"
-        )
-    return path.read_bytes()
+    if path.is_file():
+        return path.read_bytes()
+    raise HexapodError("no WebAssembly module", got="a wheel for one machine", fix="use a clone")
 
 
 def _sources() -> dict[str, Path]:

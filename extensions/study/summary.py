@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.common.files import RUN_FILE, read_json, write_json
 from hexapod_cosim.cosim.results.comparison import Change, change_of, half_width_of
 from hexapod_cosim.cosim.results.metric_table import OF_THE_RUN
-from hexapod_cosim.cosim.results.summary import Unbalanced
 from hexapod_cosim.extensions.study.folder import MANIFEST, OPTIMUM
 from hexapod_cosim.extensions.study.reading import study_from_table
 from hexapod_cosim.extensions.study.records import SCENARIO_FACTOR, Study
@@ -170,7 +169,7 @@ class Results:
     # numbers of runs by control, status and reason, the largest first
     failures: Mapping[tuple[str, str, str], int]
     figured: Mapping[str, bool]  # by control, whether any walk has a metric
-    unbalanced: Mapping[str, Unbalanced]  # by control
+    residuals: Mapping[str, Sequence[float]]  # of the energy, by control; NaN without metrics
     optimum: Mapping[str, Any] | None  # the content of optimum.json
     wall: float  # s    sum of the elapsed times of all runs
 
@@ -180,21 +179,14 @@ class Results:
         return sum(self.overall.runs.values())
 
 
-def stored_study(folder: Path) -> tuple[Study, dict[str, Any]]:
-    """Reads the study of a folder and its manifest. Raises HexapodError when there is none."""
-    manifest: dict[str, Any] = read_json(folder / MANIFEST)
-    where = str(folder / MANIFEST)
-    study = study_from_table(manifest["study"], where=where, scenarios=manifest["scenarios"])
-    # a study without a title has the name of its file
-    return replace(study, title=manifest["title"]), manifest
-
-
 def read_results(folder: Path) -> Results:
     """Reads the results of a study, also of one that runs, and writes summary.json.
 
     Raises HexapodError when the folder holds no study or its file of runs is damaged.
     """
-    study, manifest = stored_study(folder)
+    manifest, where = read_json(folder / MANIFEST), str(folder / MANIFEST)
+    study = study_from_table(manifest["study"], where=where, scenarios=manifest["scenarios"])
+    study = replace(study, title=manifest["title"])  # by default the name of the file
     with closing(Store(folder, study)) as store:
         runs = Runs(study, store)
         of_walks = [FIGURES.index(name) for name in FIGURES if name not in OF_THE_RUN]
@@ -209,10 +201,7 @@ def read_results(folder: Path) -> Results:
             of_points=len(set(runs.point.tolist())),
             failures=failure_counts(store),
             figured=dict(zip(study.controls, figured.tolist(), strict=True)),
-            unbalanced={
-                control: Unbalanced.among(residuals[:, k])
-                for k, control in enumerate(study.controls)
-            },
+            residuals=dict(zip(study.controls, residuals.T.tolist(), strict=True)),
             optimum=read_json(folder / OPTIMUM) if (folder / OPTIMUM).exists() else None,
             wall=store.select("SELECT total(wall) FROM runs")[0][0],
         )
