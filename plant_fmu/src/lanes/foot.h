@@ -55,7 +55,7 @@ typedef struct {
 /* Returns whether the friction of a row's contacts on rigid ground has bristles; others slide by
  * the tanh law then. */
 static inline int has_friction_bristles(const hxModel *model, int row) {
-  return row == HX_FOOT && hx_is_bristle_law(model->friction_law);
+  return row == HX_FOOT && hx_friction_kind(model->friction_law).has_bristles;
 }
 
 /* Returns whether the contacts of a row stand on bristles, those of friction or of soil. */

@@ -177,8 +177,8 @@ HX_API void hx_probe_sliding(const hxPlant *plant, const double slip[3], const d
   const hxFrictionAt at = {hx_splat(model->mu), hx_splat(model->static_rise)};
   const hxReal drag = hx_friction_drag(model, at, hx_sqrt(hx_dot(v, v)));
   hxBristle f = {hx_scale(drag, v), hx_zero3(), zero, drag, zero};
-  if (model->friction_law == HX_FRICTION_BRISTLE) f = hx_bristle(model, at, one, z, v);
-  if (model->friction_law == HX_FRICTION_LUGRE) f = hx_lugre(model, at, one, z, v);
+  if (hx_friction_kind(model->friction_law).has_bristles)
+    f = hx_bristle_friction(model, at, one, z, v);
   put3(f.grip, 0, out), put3(f.rate, 0, out + 3);
   out[6] = hx_lane(f.stiffness, 0), out[7] = hx_lane(f.damping, 0), out[8] = hx_lane(f.yield, 0);
 }
