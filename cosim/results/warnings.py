@@ -15,7 +15,7 @@ from hexapod_cosim.cosim.results.locomotion import fallback_columns
 from hexapod_cosim.cosim.results.summary import FIX, UNBALANCED
 from hexapod_cosim.cosim.results.support import ground_normal
 from hexapod_cosim.cosim.results.window import LEAST_DISTANCE, SKIPPED_CYCLES, View, friction_law
-from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
 from hexapod_cosim.models import LEG_NAMES, Robot
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.records import SELF_CONTACTS, Foot, Servo
@@ -76,6 +76,8 @@ def unused_settings(scenario: Scenario, robot: Robot) -> list[str]:
         for command in scenario.commands
         if command.time >= end
     ]
+    if scenario.gains and scenario.control == CONTROLS[0]:
+        found.append(f"[gains] does nothing: {CONTROLS[0]} control has none")
     kind = scenario.settings.get("terrain", {}).get("kind", robot.terrain.name)
     given = {**scenario.settings.get("terrain", {}), **scenario.parameters}
     sloped = [

@@ -37,6 +37,7 @@ from hexapod_cosim.cosim.scenario.records import (
 from hexapod_cosim.cosim.scenario.sections import (
     errors_of,
     read_commands,
+    read_gains,
     read_gravity,
     read_setting,
     read_stance,
@@ -92,6 +93,7 @@ def scenario_from_table(
             events=read_events(table.get("events", [])),
             sensors=read_record(Sensors, table.get("sensors", {}), "sensors"),
             stance=read_stance(table.get("walk", {}), "walk"),
+            gains=read_gains(table.get("gains", {}), "gains"),
             compliance=read_record(Parts, table.get("compliance", {}), "compliance"),
             variation=read_record(Variation, table["variation"], "variation")
             if "variation" in table
