@@ -23,8 +23,10 @@ from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plan import WalkPlan
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, rows_of
+from hexapod_cosim.controller.sense.health import Health
 from hexapod_cosim.controller.signals import Diagnostics, JointCommand, Measurement
 from hexapod_cosim.controller.walk.command import BodyCommand
+from hexapod_cosim.controller.walk.absence import gait_without
 from hexapod_cosim.controller.walk.fade import Fade
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.gait_clock import NO_LEG
@@ -74,7 +76,7 @@ class Controller(Stateful):
     an impossible period.
     """
 
-    STATE = ("plan", "compliant", "paper", "fade", "_start", "_count", "_shown", "_next")
+    STATE = ("plan", "compliant", "paper", "fade", "_start", "_count", "_shown", "_next", "_back", "health")
 
     def __init__(
         self,
@@ -90,9 +92,11 @@ class Controller(Stateful):
         _check_law(law)
         self.robot, self.period, self.gains, self.parts = robot, period, gains, parts
         self.legs, self.stance, self.law = LegSolver(robot), robot.stance, law
-        self.fade = Fade(period=period)
+        self.fade, self.health = Fade(period=period), self._new_health()
+        self.gait = gait  # asked for; without a leg, another is walked
         self._build(gait)
         self._next: Gait | None = None  # that the legs change to
+        self._back: int | None = None  # leg that is taken back into service then
         self.warnings = gains_warnings(robot, gains, period)
         self._out = JointCommand()
         self.diagnostics = Diagnostics()
@@ -102,7 +106,7 @@ class Controller(Stateful):
 
     def _build(self, gait: Gait) -> None:
         """Builds the parts, whose constants depend on the gait."""
-        self.gait, robot, gains, parts = gait, self.robot, self.gains, self.parts
+        robot, gains, parts = self.robot, self.gains, self.parts
         legs, period = self.legs, self.period
         self.compliant: Compliant | None = None
         self.paper: Paper | None = None
@@ -120,13 +124,16 @@ class Controller(Stateful):
             return
         plan, laws, paper = self.plan, self.compliant, self.paper
         self._build(self._next)
+        back, self._back = self._back, None
         if self.compliant is not None and laws is not None:
             self.compliant.restore(laws.save())
             self.compliant.present = laws.present
         if self.paper is not None and paper is not None:
             self.paper.restore(paper.save())
-        self.plan.adopt(plan)
+        self.plan.adopt(plan, back)
         self._next = None
+        if back is not None and self.plan.absence.legs.any():
+            self._change(self._gait_now(NO_LEG))
 
     def change_gait(self, gait: Gait) -> None:
         """Changes the gait without a jump of the feet, while the robot walks (C55).
@@ -136,9 +143,43 @@ class Controller(Stateful):
         for the period, and then changes nothing.
         """
         _check_period(self.period, gait)
+        self.gait = gait
+        self._change(self._gait_now(NO_LEG))
+        self._adopt()
+
+    def _gait_now(self, back: Mask) -> Gait:
+        """Returns the gait of the legs in service, and of those (6,) that come back."""
+        absent = self.plan.absence.legs & ~back
+        return gait_without(self.gait, absent, backwards=self.plan.ramp.target.vx < 0.0)
+
+    def _change(self, gait: Gait) -> None:
+        """Begins a change of gait (C55)."""
         self._next = gait
         self.plan.end()
-        self._adopt()
+
+    def _new_health(self) -> Health | None:
+        """Returns the watch over the servos; None under kinematic control."""
+        if self.gains is None:
+            return None
+        most = self.gains.limits.torque
+        return Health(self.robot.servo, legs=self.legs, most=most, period=self.period)
+
+    def _watch(self, health: Health, measurement: Measurement) -> None:
+        """Finds legs that are lost, before the present step is planned (C57)."""
+        health.step(measurement.angle, sense(measurement, LEVEL), self._out)
+        if self.plan.lose(health.lost, self._out):
+            self._next, self._back = self._gait_now(NO_LEG), None
+
+    def _fold(self, health: Health, measurement: Measurement) -> None:
+        """Folds legs out of service away, and takes back one that works again (C58)."""
+        absence = self.plan.absence
+        if not absence.legs.any():
+            return
+        there = absence.fold(measurement.angle, health.faulty, health.locked, self._out)
+        self.diagnostics.unreachable[...] &= ~absence.legs
+        if there.any() and self._back is None:
+            self._back = int(np.argmax(there))
+            self._change(self._gait_now(np.arange(LEGS) == self._back))
 
     def change_control(self, gains: Gains | None, law: str = "compliant") -> None:
         """Changes the control while the robot walks: arguments as for the constructor.
@@ -151,8 +192,8 @@ class Controller(Stateful):
         _check_law(law)
         self.gains, self.law = gains, law
         self.warnings = gains_warnings(self.robot, gains, self.period)
-        plan = self.plan
-        self._build(self.gait)
+        plan, self.health = self.plan, self._new_health()
+        self._build(self._gait_now(NO_LEG))
         if self._start is None:
             self.reset()
             return
@@ -186,7 +227,7 @@ class Controller(Stateful):
                 planned=shown.planned,
                 height=plan.lift(),
                 rise=feet.rise,
-                swinging=plan.paths.clock.swinging,
+                swinging=plan.paths.clock.swinging | plan.absence.legs,
                 angle=measurement.angle,
                 force=sense(measurement, LEVEL),
             )
@@ -235,7 +276,8 @@ class Controller(Stateful):
 
     def reset(self) -> None:
         """Puts the robot in its stance and clears all memory; the next step is the first."""
-        for part in (self.compliant, self.paper, self.fade, self.plan):
+        self._back = None
+        for part in (self.compliant, self.paper, self.fade, self.health, self.plan):
             if part is not None:
                 part.reset()
         self._start, self._count, self._next = None, 0, None
@@ -285,10 +327,14 @@ class Controller(Stateful):
                 self._start = t
             else:
                 self._count += 1
+                if self.health is not None:
+                    self._watch(self.health, measurement)
                 self.plan.advance(command_changed)
             self._follow_paths()
             self._apply_laws(measurement)
             self.fade.step(self.legs, self._out)
+            if self.health is not None:
+                self._fold(self.health, measurement)
             self._adopt()
         return self._out
 

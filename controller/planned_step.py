@@ -14,6 +14,7 @@ from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.comply.sway import Sway
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis
+from hexapod_cosim.controller.walk.absence import Absence
 from hexapod_cosim.controller.walk.foot_paths import PlannedFeet
 from hexapod_cosim.controller.walk.gait_clock import GaitClock
 from hexapod_cosim.controller.walk.inverse_dynamics import Masses
@@ -66,29 +67,29 @@ class StepPlanner:
         self.legs, self.laws = legs, laws
         self.sway = None if laws is None else Sway(laws.dynamics, legs, active=parts.sway)
 
-    def _lower(self, feet: PlannedFeet, plane: Plane, clock: GaitClock) -> tuple[Array, Array]:
+    def _lower(self, feet: PlannedFeet, plane: Plane, clock: GaitClock, presence: Array) -> tuple[Array, Array]:
         """Returns the activations of the legs (6,) and the lowering of their feet (6,) [m].
 
-        plane: (6,) of the feet from the torso [m].
+        plane: (6,) of the feet from the torso [m]; presence: factors (6,) of the legs.
         """
         if self.laws is None:
-            return np.ones(LEGS), np.zeros(LEGS)
+            return presence, np.zeros(LEGS)
         support = self.laws.support
         activation = support.activation(
             feet.phase, clock.stayed, clock.stays, walking=clock.walking
         )
-        activation = np.where(clock.awaited, 0.0, activation)
+        activation = np.where(clock.awaited, 0.0, activation * presence)
         return activation, support.lowering(plane, activation)
 
     def _stand(
-        self, value: Array, posture: Posture, feet: PlannedFeet, torso: complex, clock: GaitClock
+        self, value: Array, posture: Posture, feet: PlannedFeet, torso: complex, clock: GaitClock, presence: Array
     ) -> PlannedStep:
         """Computes the pose of the legs and the point masses for a torso that has moved.
 
         torso: its way in the walking frame [m].
         """
         plane = feet.plane - torso
-        activation, lowering = self._lower(feet, plane, clock)
+        activation, lowering = self._lower(feet, plane, clock, presence)
         height = feet.height - lowering
         shift, pose = place_legs(self.legs, posture, plane, height, feet.rolled)
         masses = None
@@ -110,19 +111,26 @@ class StepPlanner:
         )
 
     def lay_out(
-        self, value: Array, posture: Posture, feet: PlannedFeet, clock: GaitClock
+        self,
+        value: Array,
+        posture: Posture,
+        feet: PlannedFeet,
+        clock: GaitClock,
+        absence: Absence,
+        ahead: int,
     ) -> PlannedStep:
         """Computes way of the torso, pose of the legs and point masses for planned feet.
 
-        clock: of the gait, in the section of the step.
+        clock: of the gait, in the section of the step; ahead: periods from the present step.
         """
-        torso, sway, laws = 0j, self.sway, self.laws
+        torso, presence = absence.torso(ahead), absence.presence(ahead)
+        sway, laws = self.sway, self.laws
         if laws is not None and sway is not None and sway.acts(laws.adaptation):
             guess = sway.guess(feet, laws.adaptation)
-            masses = self._stand(value, posture, feet, guess, clock).masses
+            masses = self._stand(value, posture, feet, guess, clock, presence).masses
             assert masses is not None
-            torso = sway.of(guess, masses, laws.adaptation)
-        return self._stand(value, posture, feet, torso, clock)
+            torso += sway.of(guess, masses, laws.adaptation)
+        return self._stand(value, posture, feet, torso, clock, presence)
 
     def laden(self) -> float:
         """Returns the weight that moves with the torso over the modelled one [1] (C53)."""
