@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from secret_robots import GROUPS, Secret, secret_robot
 
-from hexapod_cosim.extensions.identify.identify import Identified, identify
+from hexapod_cosim.extensions.identify.identification import Identified, identify
 from hexapod_cosim.models import load_robot
 
 JUDGED = ("torque", "position", "attitude")  # channels of the goal: torque and pose

@@ -67,32 +67,25 @@ class StepPlanner:
         self.legs, self.laws = legs, laws
         self.sway = None if laws is None else Sway(laws.dynamics, legs, active=parts.sway)
 
-    def _lower(self, feet: PlannedFeet, plane: Plane, clock: GaitClock, presence: Array) -> tuple[Array, Array]:
-        """Returns the activations of the legs (6,) and the lowering of their feet (6,) [m].
-
-        plane: (6,) of the feet from the torso [m]; presence: factors (6,) of the legs.
-        """
-        if self.laws is None:
-            return presence, np.zeros(LEGS)
-        support = self.laws.support
-        activation = support.activation(
-            feet.phase, clock.stayed, clock.stays, walking=clock.walking
-        )
-        activation = np.where(clock.awaited, 0.0, activation * presence)
-        return activation, support.lowering(plane, activation)
-
     def _stand(
-        self, value: Array, posture: Posture, feet: PlannedFeet, torso: complex, clock: GaitClock, presence: Array
+        self,
+        value: Array,
+        posture: Posture,
+        feet: PlannedFeet,
+        torso: complex,
+        clock: GaitClock,
+        presence: Array,
     ) -> PlannedStep:
         """Computes the pose of the legs and the point masses for a torso that has moved.
 
-        torso: its way in the walking frame [m].
+        torso: its way in the walking frame [m]; presence: (6,) factors on the activations [1].
         """
         plane = feet.plane - torso
-        activation, lowering = self._lower(feet, plane, clock, presence)
+        activation, lowering, masses = presence, np.zeros(LEGS), None
+        if self.laws is not None:
+            activation, lowering = self.laws.lowered(feet.phase, plane, clock, presence)
         height = feet.height - lowering
         shift, pose = place_legs(self.legs, posture, plane, height, feet.rolled)
-        masses = None
         if self.laws is not None:
             way = feet.way + cis(feet.turn) * torso
             masses = self.laws.dynamics.place(pose, way, feet.turn, posture)
@@ -125,15 +118,16 @@ class StepPlanner:
         """
         torso, presence = absence.torso(ahead), absence.presence(ahead)
         sway, laws = self.sway, self.laws
-        if laws is not None and sway is not None and sway.acts(laws.adaptation):
-            guess = sway.guess(feet, laws.adaptation)
+        if laws is not None and sway is not None and sway.acts(laws.adaptation.narrowing):
+            guess = sway.guess(feet, laws.adaptation.laden())
             masses = self._stand(value, posture, feet, guess, clock, presence).masses
             assert masses is not None
-            torso += sway.of(guess, masses, laws.adaptation)
+            part, laden = laws.adaptation.narrowing, laws.adaptation.laden()
+            torso += part * sway.of(guess, masses, laden)
         return self._stand(value, posture, feet, torso, clock, presence)
 
     def laden(self) -> float:
         """Returns the weight that moves with the torso over the modelled one [1] (C53)."""
         assert self.sway is not None
         assert self.laws is not None
-        return self.sway.laden(self.laws.adaptation)
+        return self.laws.adaptation.laden() if self.sway.active else 1.0

@@ -5,10 +5,14 @@ servos/motor.py.
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
-from hexapod_cosim.models.records import Servo
+from hexapod_cosim.models.records import Robot, Servo
 from hexapod_cosim.models.servos.motor import (
     FULL,
     Power,
@@ -17,6 +21,8 @@ from hexapod_cosim.models.servos.motor import (
     stall_torque,
 )
 
+LOCK_YIELD = 1e-3  # rad  of a locked joint, under its motor's largest torque
+LOCK_TIME = 2e-3  # s  damping of a lock over its stiffness
 GEAR_SPEED = 0.05  # rad/s  friction_speed of servos that give none; planned torques assume it
 
 
@@ -40,7 +46,7 @@ def servo_torque(
     wanted = kp * (angle_ref - angle) + kd * (speed_ref - speed) + torque_ref
     if servo.drive == "motor":
         return motor_torque(servo, speed, wanted, power)
-    return np.clip(wanted, *torque_limits(servo, speed))
+    return np.clip(wanted, *torque_limits(servo, speed, power.strength))
 
 
 def feedback_gains(servo: Servo) -> tuple[float, float]:
@@ -48,11 +54,12 @@ def feedback_gains(servo: Servo) -> tuple[float, float]:
     return (0.0, 0.0) if servo.mode == "torque" else (servo.kp, servo.kd)
 
 
-def torque_limits(servo: Servo, speed: Array) -> tuple[Array, Array]:
-    """Returns the least and largest torque of the torque-speed line [N m]."""
-    load = speed / servo.speed_max
-    lower = -servo.torque_max * np.clip(1.0 + load, 0.0, 1.0)
-    return lower, servo.torque_max * np.clip(1.0 - load, 0.0, 1.0)
+def torque_limits(servo: Servo, speed: Array, strength: Array | float = 1.0) -> tuple[Array, Array]:
+    """Returns the least and largest torque of the torque-speed line [N m], of a servo that gives
+    this share of them.
+    """
+    load, most = speed / servo.speed_max, servo.torque_max * np.asarray(strength)
+    return -most * np.clip(1.0 + load, 0.0, 1.0), most * np.clip(1.0 - load, 0.0, 1.0)
 
 
 def gear_friction(servo: Servo, speed: Array) -> Array:
@@ -80,26 +87,28 @@ def servo_slopes(
     kp, kd = feedback_gains(servo)
     wanted = kp * (angle_ref - angle) + kd * (speed_ref - speed) + torque_ref
     if servo.drive == "motor":
-        given = power if servo.mode != "torque" else Power(1.0, power.limit)
+        given = power if servo.mode != "torque" else replace(power, supply=1.0)
         gains = kp * given.supply, kd * given.supply
-        return _motor_slopes(servo, speed, wanted * given.supply, *gains, power.limit)
+        return _motor_slopes(servo, speed, wanted * given.supply, *gains, power)
     load = speed / servo.speed_max
-    lower, upper = torque_limits(servo, speed)
+    lower, upper = torque_limits(servo, speed, power.strength)
     torque = np.clip(wanted, lower, upper)
     free = (lower < wanted) & (wanted < upper)
     falling = ~free & (torque * load > 0.0) & (np.abs(load) < 1.0)
-    line = np.where(falling, servo.torque_max / servo.speed_max, 0.0)
+    line = np.where(falling, servo.torque_max * power.strength / servo.speed_max, 0.0)
     return np.where(free, kp, 0.0), np.where(free, kd, line)
 
 
 def _motor_slopes(
-    servo: Servo, speed: Array, wanted: Array, kp: float, kd: float, limit: Array | float
+    servo: Servo, speed: Array, wanted: Array, kp: float, kd: float, power: Power
 ) -> tuple[Array, Array]:
     """Returns minus the derivatives of `motor_torque`: by angle [N m/rad], by speed [N m s/rad]."""
-    brake, torque_mode = back_emf_damping(servo), servo.mode == "torque"
-    driven = wanted + (brake * speed if torque_mode else 0.0)
-    free = np.abs(driven) < stall_torque(servo) * limit
-    damping = np.where(free, kd - (brake if torque_mode else 0.0), 0.0) + brake
+    stall, brake = stall_torque(servo) * power.limit, back_emf_damping(servo)
+    voltage_driven = 0.0 if servo.mode == "torque" else brake
+    torque = wanted - voltage_driven * speed
+    low, high = (power.strength * (side * stall - brake * speed) for side in (-1.0, 1.0))
+    free = (low < torque) & (torque < high)
+    damping = np.where(free, kd + voltage_driven, brake * power.strength)
     return np.where(free, kp, 0.0), damping
 
 
@@ -113,7 +122,7 @@ def gear_drag(servo: Servo, speed: Array) -> Array:
 
 def has_stops(servo: Servo) -> bool:
     """Returns whether stops act on the joints: a kinematic drive moves its joint through them."""
-    return servo.stop_stiffness > 0.0 and servo.mode != "kinematic"
+    return bool(np.max(servo.stop_stiffness) > 0.0) and servo.mode != "kinematic"
 
 
 def overrun(angle: Array, angle_min: Array, angle_max: Array) -> Array:
@@ -156,3 +165,24 @@ def stop_slopes(servo: Servo, past: Array, speed: Array) -> tuple[Array, Array]:
 def stop_energy(servo: Servo, past: Array) -> Array:
     """Returns the energy k x^2/2 that stops store [J], in the shape of past (`overrun`)."""
     return np.asarray(0.5 * servo.stop_stiffness * past**2 * has_stops(servo))
+
+
+def lock_joints(robot: Robot, held: Array) -> Robot:
+    """Returns the robot with joints locked at angles (6, 3) [rad], NaN for free ones.
+
+    A locked joint has stops at its angle, of arrays (6, 3) of stiffness and damping: it yields
+    1 mrad under its motor's largest torque.
+    """
+    servo, locked = robot.servo, ~np.isnan(held)
+    most = stall_torque(servo) if servo.drive == "motor" else servo.torque_max
+    stiffness = np.where(locked, most / LOCK_YIELD, servo.stop_stiffness)
+    damping = np.where(locked, LOCK_TIME * most / LOCK_YIELD, servo.stop_damping)
+    stops: dict[str, Any] = {"stop_stiffness": stiffness, "stop_damping": damping}
+    legs = []
+    for leg, angles in zip(robot.legs, held.tolist(), strict=True):
+        coxa, femur, tibia = (
+            link if math.isnan(angle) else replace(link, angle_min=angle, angle_max=angle)
+            for link, angle in zip(leg.links, angles, strict=True)
+        )
+        legs.append(replace(leg, links=(coxa, femur, tibia)))
+    return replace(robot, servo=replace(servo, **stops), legs=tuple(legs))

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
-from hexapod_cosim.models.records import Leg, Robot
+from hexapod_cosim.models.records import Leg, Robot, Torso
 
 LEGS, JOINTS = 6, 3
 BODIES = 1 + LEGS * JOINTS
@@ -111,19 +111,27 @@ def axis_normals(axis: Array) -> tuple[Array, Array]:
     return a, cross(axis, a)
 
 
-@lru_cache(maxsize=64)
 def joint_models(robot: Robot) -> tuple[JointModel, ...]:
     """Returns the 18 joints, leg by leg; joint k moves body k + 1."""
-    return tuple(_joint_model(robot, leg, joint) for leg in range(LEGS) for joint in range(JOINTS))
+    return _joint_models(robot.torso, robot.legs)
 
 
-def _joint_model(robot: Robot, leg: int, joint: int) -> JointModel:
-    data, child = robot.legs[leg], 1 + JOINTS * leg + joint
+@lru_cache(maxsize=64)
+def _joint_models(torso: Torso, legs: tuple[Leg, ...]) -> tuple[JointModel, ...]:
+    return tuple(
+        _joint_model(torso, data, leg, joint)
+        for leg, data in enumerate(legs)
+        for joint in range(JOINTS)
+    )
+
+
+def _joint_model(torso: Torso, data: Leg, leg: int, joint: int) -> JointModel:
+    child = 1 + JOINTS * leg + joint
     link, axis = data.links[joint], unit_axis(data.links[joint].axis)
     zero = axis_quaternion(np.array([0.0, 0.0, 1.0]), data.hip_yaw if joint == 0 else 0.0)
     above = data.links[joint - 1]
     from_com = (
-        np.subtract(data.hip_position, robot.torso.com)
+        np.subtract(data.hip_position, torso.com)
         if joint == 0
         else np.subtract(above.tip, above.com)
     )

@@ -12,9 +12,7 @@ kinetic one and the contacts' viscous friction are omitted, and soil is rigid.
 
 A robot without stops has limits of MuJoCo's own stiffness, which the plant does not have.
 
-A surface of blocks becomes boxes, one for each rectangle of equal height, with the same faces. A
-smooth surface becomes a height field, whose triangles between the nodes replace the bicubic
-surface. Both end at the map's edges, and materials of patches are omitted.
+The ground is a plane; robots on a surface of the catalogue are refused.
 """
 
 from __future__ import annotations
@@ -28,7 +26,8 @@ import numpy as np
 
 from hexapod_cosim.models.arrays import Array, Vector3
 from hexapod_cosim.models.dynamics import mass_matrix
-from hexapod_cosim.models.ground.faces import ground_height, surface_of
+from hexapod_cosim.models.errors import RobotError
+from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.kinematics import (
     BODIES,
     JOINTS,
@@ -39,7 +38,6 @@ from hexapod_cosim.models.kinematics import (
     quaternion_product,
     rotation_matrix,
 )
-from hexapod_cosim.models.mjcf_ground import APPROXIMATION, add_surface
 from hexapod_cosim.models.records import JOINT_NAMES, Leg, Link, Robot
 from hexapod_cosim.models.servos.motor import back_emf_damping
 from hexapod_cosim.models.urdf.writer import COLOURS, THICKNESS
@@ -62,21 +60,23 @@ GROUND = "5 5 0.1"  # m    half sizes of the drawn plane and its grid
 
 
 def robot_to_mjcf(robot: Robot) -> str:
-    """Returns the text of an MJCF file, with a keyframe "stance" on the ground."""
+    """Returns the text of an MJCF file, with a keyframe "stance" on the ground.
+
+    Raises RobotError for a robot on a surface.
+    """
+    if surface_of(robot.terrain) is not None:
+        what = "a ground that MJCF files of this project do not contain"
+        fix = "set terrain.kind to flat, and add the ground in MuJoCo"
+        expected = "flat or slope"
+        raise RobotError(what, got=robot.terrain.name, expected=expected, fix=fix, where="terrain")
     root = ET.Element("mujoco", model=robot.name)
     add(root, "compiler", angle="radian", autolimits="true", balanceinertia="false")
     option = add(root, "option", timestep=TIME_STEP, gravity=robot.gravity)
     option.attrib |= {"integrator": "implicitfast", "cone": "elliptic", "impratio": "10"}
     _assets(root)
-    surface = surface_of(robot.terrain)
-    if surface is not None:
-        root.insert(0, ET.Comment(f" {APPROXIMATION[surface.kind]} "))
     world = add(root, "worldbody")
     add(world, "light", pos="0 0 3", dir="0 0 -1", directional="true")
-    if surface is None:
-        _ground(world, robot)
-    else:
-        add_surface(root, world, surface, robot.terrain.height, _contact_attributes(robot))
+    _ground(world, robot)
     _torso(world, robot)
     _servos(root, robot)
     _stance(root, robot)
@@ -314,19 +314,13 @@ def _servos(root: ET.Element, robot: Robot) -> None:
 
 
 def _stance(root: ET.Element, robot: Robot) -> None:
-    """Adds the standing pose: the lowest feet touch the ground, and the torso is parallel to it.
-
-    On a surface the pose is above the highest place below a foot.
-    """
+    """Adds the standing pose: the lowest feet touch the ground, the torso is parallel to it."""
     tilt = _ground_quaternion(robot)
     heading = robot.terrain.heading if robot.terrain.kind == "slope" else 0.0
     quaternion = quaternion_product(tilt, axis_quaternion(Z, -heading))
     feet = foot_positions(robot, robot.stance)
     height = robot.foot.radius - float(np.min(feet[:, 2]))  # of the torso's frame above the plane
-    level = robot.terrain.height
-    if surface_of(robot.terrain) is not None:
-        level = max(ground_height(robot.terrain, x, y) for x, y, _ in feet)
-    place = np.array([0.0, 0.0, level]) + height * rotation_matrix(tilt)[:, 2]
+    place = np.array([0.0, 0.0, robot.terrain.height]) + height * rotation_matrix(tilt)[:, 2]
     key = add(add(root, "keyframe"), "key", name="stance")
     key.set("qpos", joined([*place, *quaternion, *robot.stance.ravel()]))
     key.set("ctrl", joined(robot.stance.ravel()))

@@ -1,12 +1,14 @@
 """Reads typed records from TOML tables and checks them by the annotations of their fields.
 
-Example of a field: `mass: Annotated[float, Number("kg", above=0.0)]`.
+Example of a field: `mass: Annotated[float, Number("kg", above=0.0)]`. A value is a number in SI
+units or a quantity with its unit ("5 ms").
 """
 
 from __future__ import annotations
 
 import codecs
 import math
+import re
 import tomllib
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -20,6 +22,20 @@ from hexapod_cosim.models.errors import HexapodError, RobotError, unknown_name
 
 DEEPEST = 64  # the most tables and arrays inside each other in a TOML file
 LARGEST = 2**63 - 1  # the largest integer of TOML 1.0
+# SI unit of a key -> units that may be written for it, each with its size in the SI unit
+SCALES: dict[str, dict[str, float]] = {
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
+    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2},
+    "m/s": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1.0 / 3.6},
+    "rad": {"rad": 1.0, "deg": math.pi / 180.0},
+    "rad/s": {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0},
+    "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
+    "N m": {"N m": 1.0, "mN m": 1e-3},
+    "kg": {"kg": 1.0, "g": 1e-3},
+    "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},
+    "s/m": {"s/m": 1.0, "s/mm": 1e3},
+}
+QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*")
 
 
 def parse_toml(text: str) -> dict[str, Any]:
@@ -146,6 +162,7 @@ class Number:
 
     def read(self, value: Any, where: str) -> float:
         """Returns the value as a float. Raises RobotError; `where` names the key."""
+        value = _in_si(value, self.unit, where)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise wrong_type(value, self.expected, "give a number", where)
         if not self.holds(value):
@@ -215,7 +232,78 @@ class Text:
         return value
 
 
-Spec = Number | Vector | Choice | Text
+@dataclass(frozen=True)
+class Texts:
+    """A list of texts, or of some of the `names`, which then come in their order."""
+
+    names: tuple[str, ...] = ()
+
+    @property
+    def expected(self) -> str:
+        """The names, if they are limited."""
+        return f"a list of some of {', '.join(self.names)}" if self.names else "a list of texts"
+
+    def read(self, value: Any, where: str) -> tuple[str, ...]:
+        """Returns the texts. Raises RobotError; `where` names the key."""
+        given = list(value) if isinstance(value, list | tuple) else [value]
+        known = all(isinstance(one, str) and one in (self.names or (one,)) for one in given)
+        if not isinstance(value, list | tuple) or not known or (self.names and not given):
+            fix = f'write ["{self.names[0] if self.names else "text"}"]'
+            raise wrong_type(value, self.expected, fix, where)
+        return tuple(one for one in self.names if one in given) if self.names else tuple(given)
+
+
+@dataclass(frozen=True)
+class Flag:
+    """A Boolean."""
+
+    expected = "true or false"
+
+    def read(self, value: Any, where: str) -> bool:
+        """Returns the value. Raises RobotError; `where` names the key."""
+        if not isinstance(value, bool):
+            raise wrong_type(value, self.expected, "write true or false", where)
+        return value
+
+
+@dataclass(frozen=True)
+class Whole:
+    """An integer of at least 0."""
+
+    expected = "a whole number >= 0"
+
+    def read(self, value: Any, where: str) -> int:
+        """Returns the value. Raises RobotError; `where` names the key."""
+        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+            raise wrong_type(value, self.expected, "write 1", where)
+        return value
+
+
+Spec = Number | Vector | Choice | Text | Texts | Flag | Whole
+
+
+def _in_si(value: Any, unit: str, where: str) -> Any:
+    """Converts a quantity in a string, such as "5 ms", to SI; returns any other value unchanged.
+
+    Raises RobotError for a wrong unit. `where` names the key in messages.
+    """
+    match = QUANTITY.fullmatch(value) if isinstance(value, str) else None
+    if match is None:
+        return value
+    scales = SCALES.get(unit, {unit: 1.0})
+    given = " ".join((match[2] or "").replace("*", " ").replace("N.m", "N m").split())
+    given = given.replace("Nm", "N m")
+    if given in scales:
+        return float(match[1]) * scales[given]
+    raise RobotError(
+        "wrong unit" if given else "number without unit in quotes",
+        got=value,
+        expected="a number without a unit" if unit == "1" else f"a value in {' or '.join(scales)}",
+        fix="write a plain number, without quotes"
+        if unit == "1"
+        else f"a plain number, without quotes, is in {unit}",
+        where=where,
+    )
 
 
 def wrong_type(got: Any, expected: str, fix: str, where: str) -> RobotError:
@@ -281,6 +369,19 @@ def require(record: type[Any], given: dict[str, Any], where: str) -> dict[str, A
         if key not in values:
             raise missing_key(key, spec, f"{where}.{key}")
     return values
+
+
+def read_record(record: type[Any], table: Any, where: str) -> Any:
+    """Returns the record of a table; keys that the table does not give have their defaults.
+
+    Raises RobotError.
+    """
+    given = read_given(record, table, where)
+    for item in fields(record):
+        required = item.default is MISSING and item.default_factory is MISSING
+        if required and item.name not in given:
+            raise missing_key(item.name, specs(record)[item.name], f"{where}.{item.name}")
+    return record(**given)
 
 
 def missing_key(key: str, spec: Spec, where: str) -> RobotError:

@@ -212,11 +212,13 @@ static void indicate(const hxComponent *component, double indicator[]) {
   memcpy(indicator, &all, sizeof all);
 }
 
-/* Updates the contacts; bristles are the only states that an event sets. */
+/* Updates contacts and locks; events set bristles, and the loss of a lock that is released. */
 static int update(hxComponent *component, struct hxVariables *variables) {
   hxCoordinates now;
-  if (!hx_plant_update_contacts(component->plant)) return 0;
+  const int moved = hx_plant_update_contacts(component->plant);
+  if (!hx_plant_update_locks(component->plant, &variables->input) && !moved) return 0;
   hx_plant_get_coordinates(component->plant, &now);
+  variables->state.dissipated = now.dissipated;
   memcpy(variables->state.bristle, now.bristle, sizeof now.bristle);
   return 1;
 }

@@ -51,7 +51,6 @@ LONGEST = (
     "test_study_workers",
     "test_random_robots",
     "test_browser",
-    "test_browser_ground",
     "test_cli_endings",
     "test_controller_continuity",
     "test_study_store",

@@ -25,10 +25,9 @@ from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, along, clamp, square
 from hexapod_cosim.controller.sense.burden import Burden
-from hexapod_cosim.controller.sense.contact_detection import ContactDetector, SensorWatch
-from hexapod_cosim.controller.sense.landing import Landings
-from hexapod_cosim.controller.sense.touchdown import REACH_LIMIT, Touchdown
-from hexapod_cosim.controller.sense.trust import Trust
+from hexapod_cosim.controller.sense.contact_detection import ContactDetector
+from hexapod_cosim.controller.sense.touchdown import EARLY, REACH_LIMIT, Landings, Touchdown
+from hexapod_cosim.controller.sense.trust import SensorWatch, Trust
 
 SETTLED_SHARE = 0.5  # 1    of the weight: feet that carry less together have only just landed
 GRIPPED = 0.99  # 1    of its share: a leg with more carries it
@@ -111,6 +110,15 @@ class Compliance(Stateful):
         """Returns the feet (6,) on the ground; a doubted sensor is replaced by the plan."""
         return self.detector.touching
 
+    @property
+    def heft(self) -> float:
+        """Returns measured over modelled weight [1] (C32)."""
+        return self.burden.heft
+
+    def needed(self) -> float:
+        """Returns the torque needed for the measured weight over the torque allowed [1]."""
+        return self.burden.heft * self.burden.peak / self.burden.most
+
     # ------------------------------------------------------------------------------ contacts
 
     def _replace_forces(self, plan: LoadPlan, force: Array) -> Array:
@@ -141,7 +149,7 @@ class Compliance(Stateful):
         """Adapts the foot heights to early and late contacts (C36). met: as in _judge_sensors()."""
         self.regaining = True
         early = self.landings.early(met, plan.height)
-        falling = np.where(early, plan.falling, 0.0)
+        falling = np.where(early, plan.descent, 0.0)
         searching = plan.awaited & ~self.doubted & ~self._carries()
         self.touchdown.step(
             self.touching, falling, plan.swinging, plan.standing, searching, self.doubted
@@ -163,7 +171,7 @@ class Compliance(Stateful):
 
     def _contacts_differ(self, plan: LoadPlan) -> bool:
         """Returns whether contacts contradict the plan, or a response to it is still under way."""
-        certain = plan.standing | plan.well_up
+        certain = plan.standing | (plan.height > EARLY)
         differs = ((self.touching != plan.standing) & certain | plan.awaited).any()
         return bool(differs) or self.watch.busy() or self.touchdown.busy()
 

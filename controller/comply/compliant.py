@@ -31,6 +31,7 @@ from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, cis, clamp
 from hexapod_cosim.controller.sense.load_adaptation import LoadAdaptation
 from hexapod_cosim.controller.signals import JointCommand, Measurement
 from hexapod_cosim.controller.walk.gait import Gait
+from hexapod_cosim.controller.walk.gait_clock import GaitClock
 from hexapod_cosim.controller.walk.hold import Hold, Sight
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.controller.walk.kinematics import LegSolver
@@ -173,6 +174,20 @@ class Compliant(Stateful):
             period=self.period,
         )
 
+    def lowered(
+        self, phase: Array, plane: Plane, clock: GaitClock, presence: Array
+    ) -> tuple[Array, Array]:
+        """Returns the activations of the legs (6,) and the lowering of their feet (6,) [m].
+
+        phase: (6,) of the legs [1]; plane: (6,) feet x + i y, walking frame [m]; clock: of the
+        gait, in the section of the step; presence: (6,) factors of the legs [1].
+        """
+        activation = self.support.activation(
+            phase, clock.stayed, clock.stays, walking=clock.walking
+        )
+        activation = np.where(clock.awaited, 0.0, activation * presence)
+        return activation, self.support.lowering(plane, activation)
+
     # ------------------------------------------------------------------------------- steering
 
     def addition(self, steps: int) -> Twist:
@@ -257,9 +272,8 @@ class Compliant(Stateful):
         raised = offset + self.hold.lift
         output.angle_ref[...] = self._correct(output.angle_ref, climb, raised)
         output.torque_ref[...] = laws.torque
-        burden = laws.burden
-        self.adaptation.weigh(burden.heft)
-        self.adaptation.step(laws.torque, burden.heft * burden.peak / burden.most, laws.held)
+        self.adaptation.weigh(laws.heft)
+        self.adaptation.step(laws.torque, laws.needed(), laws.held)
         if busy or self.moving:
             rise = (offset - self.offset) * self.per_second
             output.speed_ref[...] += climb * rise[:, None]

@@ -9,9 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.support import Shares
+from hexapod_cosim.controller.comply.shares import Shares
 from hexapod_cosim.controller.plane import Array, Mask, Plane
-from hexapod_cosim.controller.sense.touchdown import EARLY
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand
 
 
@@ -24,12 +23,11 @@ class LoadPlan(NamedTuple):
     feet: Plane  # m    contact points, x + i y
     weight: float  # N    scalar: of all shares
     standing: Mask  # the leg carries its whole share
-    well_up: Mask  # well above the ground: in the air even if the ground is met early
     height: Array  # m    of the paths over their ends
     needed: float  # N m    scalar: the largest of `carry`
     swinging: Mask  # planned in the air
     awaited: Mask  # the gait clock waits for the foot
-    falling: Array  # m    by which feet well above the ground come down in a period
+    descent: Array  # m    by which the feet come down in a period, at least 0
     overspeed: bool  # scalar: the plan exceeds the speed limit of some joint
 
 
@@ -60,7 +58,6 @@ def plan_load(
         period: of the controller [s].
     """
     supports = 1.0 if active else 0.0
-    well_up = height > EARLY
     carry = -supports * (demand.lever @ shares.forces()[:, :, None])[:, :, 0]
     return LoadPlan(
         own=supports * demand.torque,
@@ -69,11 +66,10 @@ def plan_load(
         feet=feet,
         weight=float(shares.normal.sum()),
         standing=shares.activation >= 1.0,
-        well_up=well_up,
         height=height,
         needed=float(np.abs(carry).max()),
         swinging=swinging,
         awaited=awaited,
-        falling=np.where(well_up, np.maximum(-period * rise, 0.0), 0.0),
+        descent=np.maximum(-period * rise, 0.0),
         overspeed=overspeed,
     )

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.support import LEAST_LOAD, indentation
+from hexapod_cosim.controller.comply.shares import LEAST_LOAD, indentation
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts

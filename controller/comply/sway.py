@@ -16,7 +16,6 @@ import numpy as np
 
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.plane import LEGS, along
-from hexapod_cosim.controller.sense.load_adaptation import LoadAdaptation
 from hexapod_cosim.controller.walk.foot_paths import PlannedFeet
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Masses
 from hexapod_cosim.controller.walk.kinematics import LegSolver
@@ -52,31 +51,32 @@ class Sway:
             self.aside = _share_of(dynamics, legs, complex(0.0, REACH))
             self.rest = _moment_of(dynamics, legs, 0j)
 
-    def acts(self, adaptation: LoadAdaptation) -> bool:
-        """Returns whether the torso sways."""
-        return self.active and adaptation.narrowing > 0.0
+    def acts(self, narrowing: float) -> bool:
+        """Returns whether the torso sways. narrowing: part of the way to the narrow stance [1]."""
+        return self.active and narrowing > 0.0
 
-    def laden(self, adaptation: LoadAdaptation) -> float:
-        """Returns the weight that sways over the modelled one [1]."""
-        return adaptation.laden() if self.active else 1.0
+    def _yield_to(self, moment: complex, laden: float) -> complex:
+        """Returns the way of the torso that gives the robot another sum of m p [kg m].
 
-    def _yield_to(self, moment: complex, adaptation: LoadAdaptation) -> complex:
-        """Returns the way of the torso that gives the robot another sum of m p [kg m]."""
-        mass, laden = self.dynamics.total_mass, adaptation.laden()
+        laden: measured over modelled weight [1].
+        """
+        mass = self.dynamics.total_mass
         x = moment.real / (mass * (laden - self.forward))
         return complex(x, moment.imag / (mass * (laden - self.aside)))
 
-    def guess(self, feet: PlannedFeet, adaptation: LoadAdaptation) -> complex:
+    def guess(self, feet: PlannedFeet, laden: float) -> complex:
         """Returns nearly the whole way of the torso, by the shares [m] x + i y, walking frame."""
         away, mass = complex(feet.plane.sum()) - self.home, self.dynamics.total_mass / LEGS
         moment = complex(self.forward * mass * away.real, self.aside * mass * away.imag)
-        return -self._yield_to(moment, adaptation)
+        return -self._yield_to(moment, laden)
 
-    def of(self, guess: complex, masses: Masses, adaptation: LoadAdaptation) -> complex:
+    def of(self, guess: complex, masses: Masses, laden: float) -> complex:
         """Returns the way of the torso in the walking frame [m], x + i y (C54).
 
-        masses: of a torso that has moved by the guess.
+        The torso sways by the part of it by which the stance is narrowed.
+
+        masses: of a torso that has moved by the guess; laden: measured over modelled weight [1].
         """
         moved = complex((self.dynamics.mass * masses.place).sum()) - self.rest
-        moved += adaptation.laden() * self.dynamics.total_mass * guess
-        return adaptation.narrowing * (guess - self._yield_to(moved, adaptation))
+        moved += laden * self.dynamics.total_mass * guess
+        return guess - self._yield_to(moved, laden)

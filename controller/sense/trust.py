@@ -1,14 +1,22 @@
-"""Decides whether the planned load applies to the robot (C33). C: trust.h.
+"""Decides whether the planned load and the force sensors can be trusted (C33, C34). C: trust.h.
 
-It does not apply to a robot that slides, whose joints cannot follow, or that is far too heavy.
-Then the trust, a factor on all torques, goes to 0 and the robot walks under kinematic control.
+The planned load does not apply to a robot that slides, whose joints cannot follow, or that is far
+too heavy. Then the trust, a factor on all torques, goes to 0 and the robot walks under kinematic
+control.
+
+A sensor is doubted when it contradicts the plan for too long: it reports a force on a foot in the
+middle of its swing, or none on a foot that should carry its load while all feet together lack
+weight. It is trusted again after one and a half gait cycles without a contradiction.
 """
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from hexapod_cosim.controller.memory import Stateful
+from hexapod_cosim.controller.plane import LEGS, Mask
 
 SLIDING_DRAG = 0.55  # 1    common tangential over normal force beyond the plan: only a robot that
 # slides exceeds it, or one on a slope of 29 degrees
@@ -17,6 +25,10 @@ SLIDING_TIME = 0.04  # s    longer than a foot skids when it touches down
 JOINTS_FOLLOW, JOINTS_DO_NOT = 0.35, 0.45  # 1    share of the time with too high joint speeds
 FEET_LATE = 0.2  # 1    the same, from which feet end their swings late whatever the ground
 TRUSTED = 0.99  # 1    so near to its goal the trust is at it
+AIRBORNE_TIME = 0.06  # s    longest plausible force on a foot in mid-swing
+ABSENT_TIME = 0.10  # s    longest plausible lack of force on a standing foot; both exceed the lag
+MISSING_SHARE = 0.92  # 1    of the weight: with less, the force of some foot is not reported
+MEMORY_CYCLES = 1.5  # 1    gait cycles without contradiction until a sensor is trusted again
 
 
 class Trust(Stateful):
@@ -69,3 +81,53 @@ class Trust(Stateful):
             if abs(goal - self.level) < 1.0 - TRUSTED:
                 self.level = goal
         return goal
+
+
+class SensorWatch(Stateful):
+    """Finds the foot sensors that contradict the plan for too long (C34).
+
+    Attributes, (6,) each:
+        contradicted: for how long a sensor has contradicted the plan [s].
+        left: time until a sensor is trusted again [s].
+    """
+
+    STATE = ("contradicted", "left")
+
+    def __init__(self, weight: float, *, cycle: float, period: float) -> None:
+        """Starts with all sensors trusted.
+
+        weight: of the robot without payload [N]; cycle: of the gait [s]; period [s].
+        """
+        self.period, self.missing = period, MISSING_SHARE * weight
+        self.memory = MEMORY_CYCLES * cycle
+        self.reset()
+
+    def reset(self) -> None:
+        """Trusts all force sensors again and forgets their contradictions."""
+        self.contradicted, self.left = np.zeros((2, LEGS))
+
+    def busy(self) -> bool:
+        """Returns whether some sensor contradicts the plan or is doubted."""
+        return bool(self.contradicted.any() or self.left.any())
+
+    @property
+    def doubted(self) -> Mask:
+        """Returns the sensors (6,) that are not trusted."""
+        return self.left > 0.0
+
+    def look(self, touching: Mask, total: float, standing: Mask, high: Mask) -> Mask:
+        """Advances the times by one period and returns `doubted`.
+
+        Args:
+            touching: (6,) feet that report a force.
+            total: the sum of all normal forces [N].
+            standing: (6,) legs that are planned to carry their whole share.
+            high: (6,) feet that are planned well above the ground.
+        """
+        absent = (total < self.missing) & standing & ~touching
+        wrong = (touching & high) | absent
+        self.contradicted = np.where(wrong, self.contradicted + self.period, 0.0)
+        too_long = self.contradicted > np.where(high, AIRBORNE_TIME, ABSENT_TIME)
+        rest = np.maximum(self.left - self.period, 0.0)
+        self.left = np.where(too_long, self.memory, rest)
+        return self.doubted

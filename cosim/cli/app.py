@@ -27,7 +27,7 @@ CORE = (
     ("controller", "Write a controller of your own.", "short_commands:app"),
     ("examples", "Copy the example programs and notebooks.", "short_commands:examples"),
     ("validate", "Check an FMU of ours and say what is wrong.", "short_commands:validate"),
-    ("terrain", "Show a kind of ground.", "short_commands:terrain"),
+    ("terrain", "Show a surface to walk on.", "short_commands:terrain"),
     ("list", "List robots, scenarios, gaits, terrains and others.", "listing:list_what"),
 )
 

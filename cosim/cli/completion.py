@@ -49,14 +49,6 @@ def _surfaces() -> Iterator[tuple[str, str]]:
         yield name, entry.about
 
 
-def _terrains() -> Iterator[tuple[str, str]]:
-    from hexapod_cosim.models.records import PLANES
-
-    for name in PLANES:
-        yield name, "plane without edges"
-    yield from _surfaces()
-
-
 def _robots() -> Iterator[tuple[str, str]]:
     from hexapod_cosim.models import list_robots
 
@@ -88,7 +80,6 @@ def _requirements() -> Iterator[tuple[str, str]]:
 scenario = _offering(_scenarios)
 setting = _offering(_settings)
 surface = _offering(_surfaces)
-terrain = _offering(_terrains)
 robot = _offering(_robots)
 gait = _offering(_gaits)
 control = _offering(_controls)

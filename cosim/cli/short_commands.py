@@ -30,7 +30,7 @@ def report(
     ],
     json: Json = False,
 ) -> None:
-    """Make the plots and the report of a run, a comparison, a study or a benchmark again."""
+    """Make a report again, of a run, comparison, study or benchmark, with figures as PNG too."""
     from hexapod_cosim.cosim.report.writing import REPORT
     from hexapod_cosim.cosim.results.folder import damage_reported, read_facts
 
@@ -46,7 +46,7 @@ def report(
 def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     """Writes the report of a folder again; `facts` are those of its run.json."""
     from hexapod_cosim.cosim.cli.extension import loaded, report_functions
-    from hexapod_cosim.cosim.report.writing import write_report
+    from hexapod_cosim.cosim.report.writing import ALL_FORMATS, write_report
     from hexapod_cosim.cosim.results.folder import read_result
 
     kind, reports = facts.get("kind"), report_functions()
@@ -65,13 +65,15 @@ def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     run = read_result(folder)
     control = run.facts.control
     accuracies = {control: run.accuracy} if run.accuracy else {}
-    return write_report({control: run}, folder, warn=warn, accuracies=accuracies)
+    return write_report(
+        {control: run}, folder, warn=warn, accuracies=accuracies, formats=ALL_FORMATS
+    )
 
 
 def _report_comparison(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     """Writes the report of a comparison's folder again; `facts` are those of its run.json."""
     from hexapod_cosim.cosim.common.files import PARTS
-    from hexapod_cosim.cosim.report.writing import write_report
+    from hexapod_cosim.cosim.report.writing import ALL_FORMATS, write_report
     from hexapod_cosim.cosim.results.folder import read_accuracies, read_result, read_scenario
     from hexapod_cosim.cosim.results.side_by_side import SEEDS, WALKS, compare_all, read_seeds
 
@@ -85,6 +87,7 @@ def _report_comparison(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
         command=facts["command"],
         walks=facts[WALKS],
         accuracies=read_accuracies(folder),
+        formats=ALL_FORMATS,
     )
 
 
@@ -111,17 +114,13 @@ def terrain(
         str,
         typer.Argument(
             metavar="NAME",
-            help="A ground of `hexapod list terrains`.",
-            autocompletion=completion.terrain,
+            help="A surface of `hexapod list terrains`.",
+            autocompletion=completion.surface,
         ),
     ],
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="FILE", help="Draw the surface as PNG or SVG."),
-    ] = None,
-    heights: Annotated[
-        Path | None,
-        typer.Option("--heights", metavar="FILE", help="Write its heights as a 16-bit PNG."),
     ] = None,
     values: Annotated[
         list[str] | None,
@@ -134,11 +133,10 @@ def terrain(
     robot: RobotName = "athena",
     json: Json = False,
 ) -> None:
-    """Show a kind of ground: its size and parameters, its picture beside a robot, its heights."""
-    from hexapod_cosim.cosim.cli.terrains import ground_from, show_terrain
+    """Show a surface: its size and parameters, and its picture beside a robot."""
+    from hexapod_cosim.cosim.cli.terrains import show_terrain, surface_from
 
-    ground = ground_from(name, values or [])
-    show_terrain(ground, robot=robot, picture=output, heights=heights, as_json=json)
+    show_terrain(surface_from(name, values or []), robot=robot, picture=output, as_json=json)
 
 
 def examples(

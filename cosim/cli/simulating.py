@@ -67,8 +67,6 @@ class Simulated:
         show_rows(with_errors(rows, checked), [facts.control])
         show_accuracy(rows, checked, metrics)
         show_text(f"walk: {facts.walking.text}")
-        if facts.drop is not None:
-            show_text(facts.drop.text)
         show_files(self.files)
 
 

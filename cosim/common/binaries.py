@@ -1,8 +1,8 @@
-"""Shared libraries: whether one is complete, before the system maps it into this process, and
-several of macOS as one.
+"""Shared libraries: whether one of Linux is complete before the system maps it into this process,
+and several of macOS as one.
 
-A library that was cut short is mapped all the same: the process then ends with SIGBUS when it
-reaches a page behind the file's end.
+Linux maps a library that was cut short all the same: the process then ends with SIGBUS when it
+reaches a page behind the file's end. Other systems refuse to load such a file.
 """
 
 from __future__ import annotations
@@ -13,15 +13,22 @@ from pathlib import Path
 
 from hexapod_cosim.models.errors import FmuError
 
-# first bytes of libraries of Linux, Windows and macOS, and of several joined for macOS
-ELF, PE, MACH, FAT = b"\x7fELF", b"MZ", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe"
+# first bytes of libraries of Linux and macOS, and of several joined for macOS
+ELF, MACH, FAT = b"\x7fELF", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe"
 PAGE_BITS = 14  # slices begin at multiples of 16 KiB, the larger of the processors' pages
-LOADED, SEGMENT = 1, 0x19  # PT_LOAD; LC_SEGMENT_64
+LOADED = 1  # PT_LOAD
 
 
 def refuse_incomplete(path: str | Path) -> None:
-    """Raises FmuError for a library that is cut short, damaged or none."""
-    problem = incomplete(Path(path).read_bytes())
+    """Raises FmuError for a library of Linux that is cut short or damaged."""
+    data = Path(path).read_bytes()
+    if not data.startswith(ELF):
+        return  # another system's, or none: the loader says so
+    try:
+        missing = max(max(_elf_ends(data)) - len(data), 0)
+        problem = f"{missing} bytes are missing at its end" if missing else ""
+    except (struct.error, IndexError):
+        problem = "its header is cut short or damaged"
     if problem:
         raise FmuError(
             "the FMU's binary cannot be loaded",
@@ -30,40 +37,6 @@ def refuse_incomplete(path: str | Path) -> None:
             fix="export the FMU again with `hexapod export`",
             where=Path(path).name,
         )
-
-
-def incomplete(data: bytes) -> str | None:
-    """Returns what is wrong with the parts that a library's header lists, or None."""
-    try:
-        missing = missing_bytes(data)
-    except ValueError as error:
-        return str(error)
-    return f"{missing} bytes are missing at its end" if missing else None
-
-
-def missing_bytes(data: bytes) -> int:
-    """Returns how many bytes a library lacks at its end; 0 for a complete one.
-
-    Raises ValueError for data that is no library of Linux, Windows or macOS.
-    """
-    try:
-        end = max(_ends(data), default=0)
-    except struct.error as error:
-        raise ValueError("its header is cut short or damaged") from error
-    return max(end - len(data), 0)
-
-
-def _ends(data: bytes) -> Iterator[int]:
-    """Yields where the parts of a library end that its header lists."""
-    if data.startswith(ELF) and data[4:5] in (b"\x01", b"\x02") and data[5:6] in (b"\x01", b"\x02"):
-        return _elf_ends(data)
-    if data.startswith(PE):
-        return _pe_ends(data)
-    if data.startswith(MACH):
-        return _mach_ends(data, 0)
-    if data.startswith(FAT):
-        return _fat_ends(data)
-    raise ValueError("it is no shared library")
 
 
 def _elf_ends(data: bytes) -> Iterator[int]:
@@ -80,37 +53,6 @@ def _elf_ends(data: bytes) -> Iterator[int]:
         if kind == LOADED:
             yield offset + length
     yield sections + section_size * section_number
-
-
-def _pe_ends(data: bytes) -> Iterator[int]:
-    """Yields the ends of the sections."""
-    start = struct.unpack_from("<I", data, 0x3C)[0]
-    _, number, _, _, _, optional, _ = struct.unpack_from("<HHIIIHH", data, start + 4)
-    for place in range(start + 24 + optional, start + 24 + optional + 40 * number, 40):
-        size, offset = struct.unpack_from("<II", data, place + 16)
-        yield offset + size
-
-
-def _mach_ends(data: bytes, start: int) -> Iterator[int]:
-    """Yields the ends of the segments."""
-    number = struct.unpack_from("<I", data, start + 16)[0]
-    place = start + 32
-    for _ in range(number):
-        kind, size = struct.unpack_from("<II", data, place)
-        if kind == SEGMENT:
-            offset, length = struct.unpack_from("<QQ", data, place + 40)
-            yield start + offset + length
-        if size == 0:
-            raise ValueError("its header is damaged")
-        place += size
-
-
-def _fat_ends(data: bytes) -> Iterator[int]:
-    """Yields the ends of a universal binary's parts."""
-    number = struct.unpack_from(">I", data, 4)[0]
-    for entry in range(min(number, 64)):
-        offset, size = struct.unpack_from(">II", data, 8 + 20 * entry + 8)
-        yield offset + size
 
 
 def join_mach_o(slices: Sequence[bytes]) -> bytes:

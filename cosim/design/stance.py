@@ -12,11 +12,9 @@ gravity sideways requires.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomlkit
 
 from hexapod_cosim.controller import (
     BodyCommand,
@@ -35,7 +33,7 @@ from hexapod_cosim.controller.gains import SupportGains
 from hexapod_cosim.controller.plane import cis
 from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Neighbours
-from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, ReachError, Robot
+from hexapod_cosim.models import ReachError, Robot
 from hexapod_cosim.models.records import Array
 
 PHASES = 24  # moments of a gait cycle at which loads are computed
@@ -278,27 +276,3 @@ def settled_motion(robot: Robot, gait: Gait, command: BodyCommand) -> Motion:
             largest = max(largest, float(np.abs(speed).max()))
             cut = cut or bool(shown.unreachable.any())
     return Motion(largest, cut)
-
-
-def write_robot(source: Path, robot: Robot, target: Path, *, name: str) -> Path:
-    """Writes a copy of a robot file with another name and the stance of a robot.
-
-    Raises GainsError for a robot that is described by a URDF, whose side file holds the stance.
-    """
-    text = source.read_text(encoding="utf-8") if source.suffix.lower() != ".urdf" else 'urdf = ""'
-    table = tomlkit.parse(text)
-    if "urdf" in table:
-        raise GainsError(
-            "the stance of a URDF is not written",
-            got=str(source),
-            expected="a robot file in TOML with [links]",
-            fix="copy the printed joint angles into the side file's stance",
-            where=robot.name,
-        )
-    table["name"] = name
-    legs: Any = table["legs"]
-    for leg, described in zip(LEG_NAMES, robot.legs, strict=True):
-        for joint, angle in zip(JOINT_NAMES, described.stance, strict=True):
-            legs[leg].setdefault(joint, tomlkit.table())["stance"] = float(angle)
-    target.write_text(tomlkit.dumps(table), encoding="utf-8")
-    return target

@@ -1,7 +1,6 @@
 """Writes a robot, its controller and a walking command as one package (SSP).
 
-The command and all other chosen values are start values of the FMUs, so that the package walks in
-tools that read no parameter sets; those of SSP 1.0 repeat them.
+The command and all other chosen values are start values of the FMUs.
 """
 
 from __future__ import annotations
@@ -9,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.export.platforms import choose_platforms
-from hexapod_cosim.cosim.export.ssp import NOTHING, Experiment, export_ssp
+from hexapod_cosim.cosim.export.ssp import Experiment, export_ssp
 from hexapod_cosim.cosim.export.start_values import with_starts
 from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
@@ -28,6 +28,7 @@ STOP = 10.0  # s
 SPEED = 0.08  # m/s    straight ahead, as in the paper's experiment
 WALK: Mapping[str, float] = MappingProxyType({"command.vx": SPEED})
 
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 Values = Mapping[str, Mapping[str, float]]  # by component and name
 
 
@@ -40,7 +41,7 @@ def export_package(
     platforms: Iterable[str] | None = None,
     fmi: int = 2,
 ) -> Path:
-    """Writes a package of plant FMU, controller FMU, connections and parameters; returns its path.
+    """Writes a package of plant FMU, controller FMU and their connections; returns its path.
 
     Args:
         setup: the controller and its robot.
@@ -76,7 +77,7 @@ def export_package(
             setup, files[CONTROLLER], platforms=chosen, fmi=fmi, starts=given[CONTROLLER]
         )
         experiment = Experiment(step=setup.period, stop=stop)
-        return export_ssp(path, files, title=setup.robot.name, experiment=experiment, values=given)
+        return export_ssp(path, files, title=setup.robot.name, experiment=experiment)
 
 
 def _refuse_driven(setup: ControllerSetup, values: Values) -> None:

@@ -140,10 +140,13 @@ def _loop(
 ) -> None:
     """Runs all macro-steps; the last row, at the end of the run, is followed by no step."""
     pushes, lost, measurement = schedule.pushes, schedule.lost, signals.measurement
+    servos = schedule.servos
     signals.read()
     for k, (t, command) in enumerate(zip(schedule.times.tolist(), schedule.commands, strict=False)):
         if pushes is not None:
             signals.push[:] = pushes[k]
+        if servos is not None:
+            signals.set_servos(servos[k])
         watch.call = k + 1
         joints = controller.step(t, command, measurement)
         watch.call = 0

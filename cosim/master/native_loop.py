@@ -35,6 +35,7 @@ from hexapod_cosim.cosim.master.signals import (
     COMMANDS,
     JOINT_COMMANDS,
     PUSH,
+    SERVOS,
     check_plant_variables,
 )
 from hexapod_cosim.cosim.scenario.schedule import Schedule
@@ -106,11 +107,11 @@ class NativeMaster:
         undriven = [name for name in inputs if name not in given]  # these stay 0
         self._drive = [*undriven, *given]
         insides = [f"controller.{name}" for name in (*_ours(shown), *_ours(marks))]
-        row = [*outputs, *flags, *PUSH, *self._drive, *insides]
+        row = [*outputs, *flags, *SERVOS, *PUSH, *self._drive, *insides]
         self._places = {name: place for place, name in enumerate(row)}
         self._value = np.zeros(len(row) + len(READINGS))
         self.columns = tuple(
-            row
+            [name for name in row if name not in SERVOS]
             if columns is None
             else [
                 name
@@ -119,10 +120,9 @@ class NativeMaster:
             ]
         )
         self._judged = judged
+        self._plant_inputs: dict[int, Any] = {}  # by the number of values before the drive
         self._arrays: list[NDArray[Any]] = []  # keeps alive what the structure points to
         self._master = loop_header().types["hxMaster"](
-            push_count=len(PUSH),
-            push_place=self._places[PUSH[0]],
             drive_place=self._places[self._drive[0]],
             drive_count=len(self._drive),
             drive=self._keep(np.zeros(len(self._drive))),
@@ -142,7 +142,6 @@ class NativeMaster:
         place = self._places[self._drive[-1]] + 1 - len(driven)
         stepper.plant_output = self._block(plant, outputs, 0)
         stepper.plant_flag = self._block(plant, flags, len(outputs))
-        stepper.plant_input = self._block(plant, [*PUSH, *self._drive], self._places[PUSH[0]])
         stepper.controller_output = self._block(controller, read, place)
         stepper.controller_flag = self._block(controller, _theirs(marks), place + len(read))
         stepper.controller_input = self._references(controller, _theirs(self._inputs))
@@ -196,15 +195,16 @@ class NativeMaster:
         end.
         """
         master, sensors = self._master, Sensors(errors, self._places, first=len(self._places))
-        for name in ("feet", "joints", "torso", "servos"):
+        for name in ("feet", "joints", "torso"):
             setattr(master, name, getattr(sensors, name))
+        pushed = self._choose_inputs(schedule)
         ours = _ours(self._inputs)
         chosen = [COMMANDS.index(name) for name in ours if name in COMMANDS]
         kept: list[Any] = [sensors]
         for name, array, kind in (
             ("time", schedule.times, np.float64),
             ("command", schedule.rows[:, chosen], np.float64),
-            ("push", schedule.pushes, np.float64),
+            ("push", pushed, np.float64),
             ("lost", schedule.lost, np.uint8),
         ):
             values = None if array is None else np.ascontiguousarray(array, dtype=kind)
@@ -214,6 +214,23 @@ class NativeMaster:
         kept.append(np.array(sensed, dtype=np.uintp))
         master.stepper.sensed = kept[-1].ctypes.data
         return kept
+
+    def _choose_inputs(self, schedule: Schedule) -> NDArray[np.float64] | None:
+        """Sets which inputs the plant gets, those of servos where they have faults. Returns the
+        rows of servos and pushes; None: neither changes.
+        """
+        master, pushes, servos = self._master, schedule.pushes, schedule.servos
+        first = PUSH if servos is None else [*SERVOS, *PUSH]
+        master.push_count, master.push_place = len(first), self._places[first[0]]
+        if len(first) not in self._plant_inputs:
+            names = [*first, *self._drive]
+            block = self._block(self._fmus["plant"], names, master.push_place)
+            self._plant_inputs[len(first)] = block
+        master.stepper.plant_input = self._plant_inputs[len(first)]
+        if servos is None:
+            return pushes
+        still = np.zeros((len(servos), len(PUSH)))
+        return np.hstack([servos, still if pushes is None else pushes])
 
     def _run_steps(
         self, times: NDArray[np.float64], h: float, rows: Rows, progress: Progress | None

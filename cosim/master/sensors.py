@@ -1,7 +1,7 @@
-"""Errors of sensors and servos: noise, delay and faults (cosim/master/src/sensors.c).
+"""Errors of sensors: noise, delay and faults (cosim/master/src/sensors.c).
 
 The C functions serve both loops. Contacts are derived from forces, so noise does not change them
-but delay and faults do. Servos know the true angles.
+but delay and faults do.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import (
-    JOINTS,
     LEGS,
     foot_names,
     foot_vector_names,
@@ -44,12 +43,11 @@ TORSO = [[*MEASURED["quaternion"], *MEASURED["angular_velocity"]]]
 NO_CONTACT = (0.0, 0.0, 0.0, 0.0), (np.nan, np.nan, np.nan, 0.0)
 NO_MOTION = (0.0, 0.0), (np.nan, np.nan)
 LEVEL_AT_REST = (1.0, *6 * (0.0,)), 7 * (np.nan,)  # quaternion, rotation rate [rad/s]
-REFERENCES = ("angle_ref", "speed_ref", "torque_ref", "acceleration_ref")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Errors:
-    """Errors of the sensors and servos of a run. Faults apply after noise and delay."""
+    """Errors of the sensors of a run. Faults apply after noise and delay."""
 
     noise: float = 0.0  # 1    of the forces: standard deviation, as a share of the force
     seed: int = 0  # of the noise
@@ -57,7 +55,6 @@ class Errors:
     feet: SensorFaults | None = None
     joints: SensorFaults | None = None
     torso: SensorFaults | None = None
-    servos: NDArray[np.int8] | None = None  # (moments, 6, 3)
     moments: int = 0  # of the run
 
 
@@ -71,20 +68,19 @@ def errors_of(scenario: Scenario, schedule: Schedule) -> Errors:
         feet=schedule.faults,
         joints=schedule.angle_faults,
         torso=schedule.attitude_faults,
-        servos=schedule.servo_faults,
         moments=len(schedule.times),
     )
 
 
 class Sensors:
-    """Sensors and servos with errors, on a row of values of one run.
+    """Sensors with errors, on a row of values of one run.
 
-    Attributes: `feet`, `joints`, `torso` and `servos`, structures for C; `measured`, the index in
+    Attributes: `feet`, `joints` and `torso`, structures for C; `measured`, the index in
     the row of each of READINGS: that of the true value where a sensor has no errors.
 
     Args:
         errors: of the run.
-        places: indices in the row by name, of READINGS and of the plant's inputs.
+        places: indices in the row by name, of READINGS.
         first: index in the row of the first of READINGS as sensors read them.
     """
 
@@ -92,16 +88,16 @@ class Sensors:
         self._arrays: list[NDArray[Any]] = []  # keeps alive what the structures point to
         self._places, self._first = places, first
         self.measured = {name: places[name] for name in READINGS}
-        factor = None
-        if errors.noise:
-            shape = max(errors.moments, 1), LEGS, 3
-            normal = np.random.default_rng(errors.seed).standard_normal(shape)
-            factor = 1.0 + errors.noise * normal
+        factor, noise = None, np.full((max(errors.moments, 1), LEGS), errors.noise)
+        if errors.feet is not None:
+            noise += errors.feet.noise
+        if noise.any():
+            normal = np.random.default_rng(errors.seed).standard_normal((*noise.shape, 3))
+            factor = 1.0 + noise[:, :, None] * normal
         moments = errors.moments
         self.feet = self._make(FEET, errors.feet, NO_CONTACT, moments, factor, errors.delay)
         self.joints = self._make(ENCODERS, errors.joints, NO_MOTION, moments)
         self.torso = self._make(TORSO, errors.torso, LEVEL_AT_REST, moments)
-        self.servos = self._make_servos(errors.servos)
         # without errors there is nothing to call
         self._sensors = [ct.byref(one) for one in (self.feet, self.joints, self.torso) if one.count]
 
@@ -144,27 +140,7 @@ class Sensors:
             memory=self._keep(np.zeros((slots, count, size)), np.float64), **given,
         )  # fmt: skip
 
-    def _make_servos(self, faults: NDArray[np.int8] | None) -> Any:
-        """Returns the structure of the servos; one of no servos without faults."""
-        make = loop_header().types["hxServos"]
-        if faults is None:
-            return make()
-        where = {
-            key: self._keep([self._places[name] for name in joint_names(key)], np.uintp)
-            for key in ("angle", "speed", *REFERENCES)
-        }
-        stuck_at = self._keep(np.full(LEGS * JOINTS, np.nan), np.float64)
-        return make(
-            count=LEGS * JOINTS, moments=len(faults), fault=self._keep(faults, np.int8),
-            stuck_at=stuck_at, **where,
-        )  # fmt: skip
-
     def read(self, moment: int, row: NDArray[np.float64]) -> None:
         """Computes the readings in the row after `moment` macro-steps."""
         for sensors in self._sensors:
             master_library().hx_sensors_read(sensors, moment, row.ctypes.data)
-
-    def break_servos(self, moment: int, row: NDArray[np.float64]) -> None:
-        """Replaces the joint commands in the row of servos with faults."""
-        if self.servos.count:
-            master_library().hx_servos_break(ct.byref(self.servos), moment, row.ctypes.data)

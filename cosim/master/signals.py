@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
 from hexapod_cosim.cosim.interface.names import AXES, JOINTS, LEGS, joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_block import FmuBlock
 from hexapod_cosim.cosim.master.sensors import CONTACT, MEASURED, READINGS, Errors, Sensors
 from hexapod_cosim.models import FmuError
 
@@ -25,6 +26,8 @@ COMMANDED = {
 }
 JOINT_COMMANDS = [name for names in COMMANDED.values() for name in names]
 ACCELERATION = joint_names("acceleration_ref")
+# strength and lock, leg by leg: 1 and 0 unless a servo has a fault
+SERVOS = [*joint_names("strength"), *joint_names("lock")]
 PUSH = [*vector_names("torso.push_force"), *vector_names("torso.push_torque")]
 SHAPES = {"angle": (LEGS, JOINTS), "speed": (LEGS, JOINTS), "foot_force": (LEGS, len(AXES))}
 
@@ -32,7 +35,7 @@ SHAPES = {"angle": (LEGS, JOINTS), "speed": (LEGS, JOINTS), "foot_force": (LEGS,
 class Signals:
     """The plant's blocks of variables and array views of them.
 
-    `errors`: of sensors and servos; None: there are none.
+    `errors`: of sensors; None: there are none.
 
     Attributes: `names` and `values` of the recorded row, flags as 0 and 1; its blocks `outputs`,
     `flags` and `inputs`; `measurement`, which the controller reads; `push` (6,), which the loop
@@ -55,6 +58,8 @@ class Signals:
         self.outputs = plant.block(output_names, output_row)
         self.inputs = plant.block(input_names, input_row)
         self.flags = plant.block(flag_names)
+        self._plant: Fmu = plant
+        self._servos: FmuBlock | None = None
         commands, self.push, accelerations = np.split(
             input_row, np.cumsum([len(JOINT_COMMANDS), len(PUSH)])
         )
@@ -95,9 +100,15 @@ class Signals:
         self._acceleration_ref[...] = command.acceleration_ref
         self.hold()
 
+    def set_servos(self, states: NDArray[np.float64]) -> None:
+        """Writes the states (36,) of the servos, strengths and locks, where they have changed."""
+        if self._servos is None or not np.array_equal(states, self._servos.values):
+            self._servos = self._servos or self._plant.block(SERVOS)
+            self._servos.values[...] = states
+            self._servos.set()
+
     def hold(self) -> None:
         """Writes the last joint command again, and the present push."""
-        self._sensors.break_servos(self._moment, self._row)
         self.inputs.set()
 
 

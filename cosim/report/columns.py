@@ -6,7 +6,6 @@ A column is left out if the recording lacks a variable that it is made of.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,47 +28,14 @@ Columns = dict[str, Array]
 MOST_ROWS = 20_000  # of a run: all rows of 100 s at 5 ms; more rows would open slowly
 
 
-@dataclass(frozen=True)
-class Chosen:
-    """Columns of a run, reduced to fewer rows if necessary."""
-
-    time: Array  # (rows,) s
-    columns: Columns  # (rows,) each
-    bucket: int  # rows of the recording that two of these represent; 1: these are all rows
-
-
-def choose(view: View, *, most_rows: int = MOST_ROWS) -> Chosen:
-    """Returns the columns of a report.
-
-    In a longer recording, two rows represent each `bucket` of rows. Columns of the replay keep the
-    values at the times of these rows; columns of curves hold the least and the largest value of the
-    bucket, in the order of their times, so that no peak is lost.
+def choose(view: View, *, most_rows: int = MOST_ROWS) -> tuple[Array, Columns, int]:
+    """Returns the times (rows,) [s] and the columns (rows,) of a report, and which share of the
+    recording's rows they are: every one, or every second, third ... of a longer recording.
     """
-    replayed, drawn = _gather(view, REPLAYED), _gather(view, DRAWN)
     time = view.recording.time
-    if len(time) <= most_rows:
-        return Chosen(time, replayed | drawn, 1)
-    bucket = -(-2 * len(time) // most_rows)
-    rows = _two_per_bucket(len(time), bucket)
-    columns = {name: values[rows] for name, values in replayed.items()}
-    columns |= {name: envelope(values, bucket) for name, values in drawn.items()}
-    return Chosen(time[rows], columns, bucket)
-
-
-def _two_per_bucket(rows: int, bucket: int) -> NDArray[np.intp]:
-    """Returns the first and middle row of each bucket; in the last bucket, its last row."""
-    first = np.arange(0, rows, bucket)
-    chosen = np.column_stack([first, np.minimum(first + bucket // 2, rows - 1)]).reshape(-1)
-    chosen[-1] = rows - 1
-    return chosen
-
-
-def envelope(values: Array, bucket: int) -> Array:
-    """Returns the least and largest value of each bucket (2 x buckets,), in order of time."""
-    short = -len(values) % bucket
-    table = np.concatenate([values, np.repeat(values[-1:], short)]).reshape(-1, bucket)
-    places = np.sort(np.column_stack([table.argmin(axis=1), table.argmax(axis=1)]), axis=1)
-    return np.asarray(np.take_along_axis(table, places, axis=1).reshape(-1))
+    every = max(-(-len(time) // most_rows), 1)
+    columns = _gather(view, (*REPLAYED, *DRAWN))
+    return time[::every], {name: values[::every] for name, values in columns.items()}, every
 
 
 Maker = Callable[[View], Iterator[tuple[str, Array]]]

@@ -1,16 +1,13 @@
 """Describes robot and ground of a run for the viewer, from the FMU's parameters and the surface.
 
-Heights of a surface are in 16-bit steps, materials bytes. A height is reproduced within
-range/131070: 4 um for a surface whose heights differ by half a metre.
+A height of a surface is reproduced within range/131070: 4 um if heights differ by half a metre.
 """
 
 from __future__ import annotations
 
-import base64
 import math
 import tomllib
-import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,18 +15,15 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.export.picture import COLOURS, THICKNESS
 from hexapod_cosim.cosim.interface.names import vector_names
-from hexapod_cosim.cosim.report.packing import STEPS
+from hexapod_cosim.cosim.report.packing import pack
 from hexapod_cosim.cosim.results.folder import StoredResult
-from hexapod_cosim.cosim.results.footprints import Footprint
 from hexapod_cosim.cosim.results.support import FLAT, SLOPE
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot
 from hexapod_cosim.models.ground.faces import surface_heights
 from hexapod_cosim.models.ground.patches import PROPERTIES
 from hexapod_cosim.models.ground.smooth import RUN_OUT
 from hexapod_cosim.models.ground.surface import LAW, MU, Surface
-from hexapod_cosim.models.ground.table import CATALOGUE
 from hexapod_cosim.models.schema import parse_toml
-from hexapod_cosim.models.soil.presets import list_soils, soil_preset
 
 Parameters = Mapping[str, float]
 Array = NDArray[np.float64]
@@ -109,26 +103,21 @@ def pack_surface(surface: Surface, parameters: Mapping[str, float]) -> dict[str,
     """Returns a surface for the viewer (scene/surface.ts): its grid, heights and materials.
 
     A smooth surface is sampled finely, with the run-out of its slope beyond the border, so that the
-    viewer needs no law of its own between samples. Heights are steps of `step` [m] above `low` [m]:
-    row by row, as differences of differences along both axes modulo 2^16, all low bytes before all
-    high bytes, deflated.
+    viewer needs no law of its own between samples. Heights [m] and materials are columns, row by
+    row.
     """
     x, y, height, material = _sampled(surface)
-    low, step = float(height.min()), float(np.ptp(height)) / STEPS
-    steps = np.round((height - low) / (step or 1.0)).astype(np.uint16)
+    columns = {"height": height.ravel()}
+    if material is not None:
+        columns["material"] = material.ravel().astype(np.float64)
     return {
         "kind": surface.kind,
-        "name": str(surface.recipe.get("kind", surface.name)),
-        "rows": height.shape[0],
-        "columns": height.shape[1],
+        "across": height.shape[1],
         "x0": float(x[0]),
         "y0": float(y[0]),
         "cell": float(x[1] - x[0]),
-        "low": low,
-        "step": step,
-        "data": _deflated_steps(steps),
         "materials": material_legend(surface, parameters),
-        "material": "" if material is None else _deflated(material),
+        **pack(np.zeros(height.size), columns),
     }
 
 
@@ -154,63 +143,16 @@ def _sampled(surface: Surface) -> tuple[Array, Array, Array, NDArray[np.uint8] |
     return x, y, height, None if surface.material is None else surface.material[nodes]
 
 
-def pack_footprints(footprints: Iterable[Footprint]) -> list[list[float]]:
-    """Returns begin, end [s], x, y, depth and radius [m] of footprints for the viewer.
-
-    The end of those that stay is 0.
-    """
-    return [
-        [
-            round(one.begin, 6),
-            round(one.end, 6) if math.isfinite(one.end) else 0.0,
-            round(one.x, 5),
-            round(one.y, 5),
-            round(one.depth, 6),
-            one.radius,
-        ]
-        for one in footprints
-    ]
-
-
 def stride(surface: Surface) -> int:
     """Returns how many nodes of a surface one drawn node stands for, along each axis."""
     return max(int(np.ceil(np.sqrt(surface.height.size / MOST_NODES))), 1)
-
-
-def _deflated_steps(steps: NDArray[np.uint16]) -> str:
-    """Deflates heights; a plane and a step along an axis become almost only zeros."""
-    for axis in (0, 1):
-        edge = np.zeros_like(steps.take([0], axis=axis))
-        steps = np.diff(steps, axis=axis, prepend=edge)
-    planes = steps.astype("<u2").reshape(-1).view(np.uint8).reshape(-1, 2).T
-    return _deflated(np.ascontiguousarray(planes))
-
-
-def _deflated(content: NDArray[np.uint8]) -> str:
-    return base64.b64encode(zlib.compress(content.tobytes(), 9)).decode("ascii")
 
 
 def material_legend(surface: Surface, parameters: Mapping[str, float]) -> list[dict[str, str]]:
     """Returns what each material from 1 on is drawn as, and its text for the legend."""
     if surface.materials is None:
         return []
-    names = _soil_names(surface)
-    return [
-        {"look": _look(row, parameters), "text": _describe(row, name)}
-        for row, name in zip(surface.materials, names, strict=True)
-    ]
-
-
-def _soil_names(surface: Surface) -> list[str]:
-    """Returns the soil of each material as the recipe has it, "" where none is known."""
-    count = 0 if surface.materials is None else len(surface.materials)
-    recipe = surface.recipe
-    entry = CATALOGUE.get(str(recipe.get("kind", "")))
-    names = []
-    if entry is not None and "soil" in entry.parameters:
-        names = [str(recipe.get("soil", entry.parameters["soil"].default))]
-    names += [str(patch.get("soil", "")) for patch in recipe.get("patch", ())]
-    return names if len(names) == count else [""] * count
+    return [{"look": _look(row, parameters), "text": _describe(row)} for row in surface.materials]
 
 
 def _look(row: NDArray[np.float64], parameters: Mapping[str, float]) -> str:
@@ -219,17 +161,12 @@ def _look(row: NDArray[np.float64], parameters: Mapping[str, float]) -> str:
     return SLIPPERY if row[MU] < parameters.get("friction.mu", 0.0) else PATCH
 
 
-def _describe(row: NDArray[np.float64], soil: str) -> str:
+def _describe(row: NDArray[np.float64]) -> str:
     """Returns the properties of a material that differ from the ground of the definition."""
-    parts = [
+    parts = ["soil"] if row[LAW] > 0.0 else []
+    parts += [
         f"{key} {row[column]:.3g}{UNITS[key]}"
         for key, column in PROPERTIES.items()
         if np.isfinite(row[column])
     ]
-    if row[LAW] > 0.0:
-        parts.insert(0, _soil_title(soil))
     return ", ".join(parts)
-
-
-def _soil_title(soil: str) -> str:
-    return soil_preset(soil).title if soil in list_soils() else soil or "soft ground"

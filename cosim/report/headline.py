@@ -1,4 +1,4 @@
-"""The headline of a report: what compliant control changes, or what a single run was."""
+"""The headline of a report: the largest effects of a control, or what a single run was."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.cosim.results.comparison import BETTER, WORSE, Change, Comparison
-from hexapod_cosim.cosim.results.drop import Drop
 from hexapod_cosim.cosim.results.facts import RunFacts
 from hexapod_cosim.cosim.results.metric_table import METRICS, PER_RADIAN
 from hexapod_cosim.cosim.results.window import TANH
 from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.models.ground.surface import LAW, Surface
 
-# metric -> its name on a card and its name in the sentence, where "less" or "more" precedes it.
+# metric -> its name on a card, and its name in the sentence, where "less" or "more" precedes it.
 # Metrics that depend on no assumed slope of friction come first, slip last.
-SHOWN = {
+CARDS = {
     "height_rms": ("height, RMS", "bobbing"),
     "roll_rms": ("roll, RMS", "rolling"),
     "foot_error_stance": ("feet from their plan, stance", "error of the standing feet"),
@@ -32,6 +31,16 @@ SHOWN = {
     "cost_per_radian": ("work per radian", "motor work per radian"),
     "electrical_cost_per_radian": ("electrical cost per radian", "electrical energy per radian"),
     "slip_per_radian": ("slip per radian", "slip"),
+}
+# metrics that only the sentence names, where their change is among the largest
+PHRASES = {name: phrase for name, (_, phrase) in CARDS.items()} | {
+    "foot_error_swing": "error of the swinging feet",
+    "path_error": "error of the path",
+    "path_error_per_radian": "drift from the place",
+    "yaw_drift": "drift of the heading",
+    "yaw_drift_per_radian": "drift of the heading",
+    "pitch_rms": "pitching",
+    "peak_force": "largest foot force",
 }
 CREEP = (
     "Under the tanh friction law a foot under load always creeps, "
@@ -47,7 +56,7 @@ MILLI = {  # unit -> factor and unit on a card
 }
 RIGID = 1.0  # soil.law: none
 ROUND_OFF = 1e-9  # m    of an error of the feet; a smaller one is not shown
-MOST_GAINS = 4  # in the sentence
+MOST = 3  # gains, and costs, in the sentence
 
 
 @dataclass(frozen=True)
@@ -70,51 +79,41 @@ class Card:
 
 
 def headline(comparison: Comparison) -> list[Part]:
-    """Returns the headline of a comparison.
-
-    It tells which runs did not walk to the end, and then the significant gains and losses of the
-    second control.
+    """Returns the headline of a comparison: the runs that did not walk to the end, then the largest
+    of the significant gains and losses of the second control.
     """
     first, second = comparison.labels
     falls = _falls(comparison)
     pairs = zip(comparison.first, comparison.second, strict=True)
     if falls and not any(a.success and b.success for a, b in pairs):
         return [*falls, Part(". No pair of walks can be compared.")]
-    begin = f"Against {first} control, {second}"
-    if falls:
-        begin = f"Where both walked, against {first} control, {second}"
-    stop = [*falls, Part(". ")] if falls else []
-    gains, losses = _changes(comparison, BETTER), _changes(comparison, WORSE)
+    against = f"gainst {first} control, {second}"
+    begin = [*falls, Part(f". Where both walked, a{against}")] if falls else [Part(f"A{against}")]
+    gains, losses = _largest(comparison, BETTER), _largest(comparison, WORSE)
     if not gains and not losses:
-        return [*stop, Part(_no_change(comparison, begin))]
-    parts = [
-        *stop,
-        Part(begin),
-        Part(" walks with " if gains else " brings "),
-        *_listed(gains[:MOST_GAINS] or losses),
-    ]
+        return _no_change(comparison, begin)
+    begin += [Part(" walks with " if gains else " brings "), *_listed(gains or losses)]
     if gains and losses:
-        parts += [Part(", and costs "), *_listed(losses)]
-    return [*parts, Part(".")]
+        begin += [Part(", and costs "), *_listed(losses)]
+    return [*begin, Part(".")]
 
 
-def _shown(comparison: Comparison) -> dict[str, tuple[str, str]]:
-    """Returns the entries of SHOWN that the runs have; those per radian instead of per metre."""
+def _known(comparison: Comparison) -> set[str]:
+    """Returns the metrics that the runs have; those per radian instead of those per metre."""
     known = {name for name, change in comparison.changes.items() if change.pairs}
-    twice = {radian for metre, radian in PER_RADIAN.items() if metre in known}
-    return {name: texts for name, texts in SHOWN.items() if name in known - twice}
+    return known - {radian for metre, radian in PER_RADIAN.items() if metre in known}
 
 
 def creep_note(facts: RunFacts, surface: Surface | None = None) -> str:
     """Returns a note on slip under a run's friction law, "" if there is none.
 
-    A drop has none, nor has ground with soil: there the law does not act, and slip is shear.
+    Ground with soil has none: there the law does not act, and slip is shear.
 
     surface: the run's.
     """
     parameters = facts.parameters
     creeps = parameters.get("friction.law", TANH) == TANH
-    return CREEP if creeps and not facts.drop and not _has_soil(parameters, surface) else ""
+    return CREEP if creeps and not _has_soil(parameters, surface) else ""
 
 
 def _has_soil(parameters: Mapping[str, Any], surface: Surface | None) -> bool:
@@ -128,50 +127,48 @@ def _has_soil(parameters: Mapping[str, Any], surface: Surface | None) -> bool:
 
 def _falls(comparison: Comparison) -> list[Part]:
     """Tells how many runs did not complete with the robot upright; returns [] when all did."""
-    count, walked = len(comparison.seeds), comparison.walked
-    lost = {label: count - number for label, number in walked.items()}
-    if not any(lost.values()):
+    count = len(comparison.seeds)
+    first, second = (count - comparison.walked[label] for label in comparison.labels)
+    if not first + second:
         return []
-    first, second = comparison.labels
-    verdicts = ("", "")
-    if lost[first] != lost[second]:
-        verdicts = (WORSE, BETTER) if lost[first] > lost[second] else (BETTER, WORSE)
-    counts = [
-        Part(f"{label} in {lost[label]} of {count}", verdict)
-        for label, verdict in zip(comparison.labels, verdicts, strict=True)
-    ]
-    return [
-        Part("The robot did not walk to the end under "),
-        counts[0],
-        Part(" and under "),
-        counts[1],
-        Part(" runs"),
-    ]
+    verdicts = (
+        ("", "") if first == second else (WORSE, BETTER) if first > second else (BETTER, WORSE)
+    )
+    begin, end = (
+        Part(f"{label} in {lost} of {count}", verdict)
+        for label, lost, verdict in zip(comparison.labels, (first, second), verdicts, strict=True)
+    )
+    start = Part("The robot did not walk to the end under ")
+    return [start, begin, Part(" and under "), end, Part(" runs")]
 
 
-def _no_change(comparison: Comparison, begin: str) -> str:
-    """Returns the sentence for runs that differ in no main metric."""
-    if not any(comparison.changes[name].pairs for name in SHOWN):
-        return (
+def _no_change(comparison: Comparison, begin: list[Part]) -> list[Part]:
+    """Returns the sentence for runs that differ in no metric that it can name."""
+    if not any(comparison.changes[name].pairs for name in CARDS):
+        text = (
             "The walk was too short to measure: "
             "figures are of whole gait cycles after the first two."
         )
-    others = [
-        name for name, change in comparison.changes.items() if change.verdict in {BETTER, WORSE}
-    ]
-    if others:
-        return f"{begin} control changes none of the main figures, but {', '.join(others)}."
-    return f"{begin} control changes nothing that these runs could tell."
+        return [Part(text)]
+    return [*begin, Part(" control changes nothing that these runs could tell.")]
 
 
-def _changes(comparison: Comparison, verdict: str) -> list[Part]:
-    """Returns the changes with a verdict, as parts of the sentence."""
-    found = [(what, comparison.changes[name]) for name, (_, what) in _shown(comparison).items()]
-    return [
-        Part(_less_or_more(what, change), verdict)
-        for what, change in found
-        if change.verdict == verdict and math.isfinite(change.relative)
-    ]
+def _largest(comparison: Comparison, verdict: str) -> list[Part]:
+    """Returns the largest changes with a verdict, by their ratio, as parts of the sentence."""
+    found = {
+        name: change
+        for name, change in comparison.changes.items()
+        if name in _known(comparison) & PHRASES.keys()
+        and change.verdict == verdict
+        and math.isfinite(change.relative)
+    }
+    ordered = sorted(found, key=lambda name: -_size(found[name]))
+    return [Part(_less_or_more(PHRASES[name], found[name]), verdict) for name in ordered[:MOST]]
+
+
+def _size(change: Change) -> float:
+    """Returns how large a change is: the logarithm of its ratio, of either sign."""
+    return abs(math.log(max(1.0 + change.relative, 1e-12)))
 
 
 def _less_or_more(what: str, change: Change) -> str:
@@ -183,20 +180,19 @@ def _less_or_more(what: str, change: Change) -> str:
 
 def _listed(parts: list[Part]) -> list[Part]:
     """Joins parts with commas and "and"."""
-    between = [Part(", ")] * (len(parts) - 2) + [Part(" and ")] * (len(parts) > 1)
-    return [
-        piece
-        for pair in zip(parts, [*between, Part("")], strict=True)
-        for piece in pair
-        if piece.text
-    ]
+    joined = [parts[0]]
+    for number, part in enumerate(parts[1:], 2):
+        joined += [Part(" and " if number == len(parts) else ", "), part]
+    return joined
 
 
 def cards(comparison: Comparison) -> list[Card]:
-    """Returns the cards of the metrics in SHOWN that the runs have."""
+    """Returns the cards of the metrics in CARDS that the runs have."""
+    known = _known(comparison)
     return [
         _card(text, METRICS[name][0], comparison.changes[name])
-        for name, (text, _) in _shown(comparison).items()
+        for name, (text, _) in CARDS.items()
+        if name in known
     ]
 
 
@@ -206,13 +202,8 @@ def _card(name: str, unit: str, change: Change) -> Card:
     known = math.isfinite(change.relative)
     low, high = change.interval
     interval = f"({_share(low).removesuffix(' %')} to {_share(high)})" if math.isfinite(low) else ""
-    return Card(
-        name,
-        _share(change.relative) if known else change.verdict,
-        f"{before} → {after} {unit}",
-        interval,
-        change.verdict,
-    )
+    relative = _share(change.relative) if known else change.verdict
+    return Card(name, relative, f"{before} → {after} {unit}", interval, change.verdict)
 
 
 def _digits(value: float) -> str:
@@ -227,12 +218,7 @@ def _share(value: float) -> str:
 
 
 def plain_headline(metrics: Mapping[str, float | None], facts: RunFacts) -> list[Part]:
-    """Returns the headline of one run: duration, speed, error of the feet, cost of transport.
-
-    That of a drop has the restitution of its first impact instead.
-    """
-    if facts.drop is not None:
-        return [_drop_part(facts.drop, facts.simulated)]
+    """Returns the headline of one run: duration, speed, error of the feet, cost of transport."""
     speed, label = facts.walk.mean_speed, facts.control
     name = f"{label.capitalize()} control" if label in CONTROLS else f"Control {label}"
     begin = f"{name}, {facts.simulated:.4g} s"
@@ -243,13 +229,3 @@ def plain_headline(metrics: Mapping[str, float | None], facts: RunFacts) -> list
     if cost is not None and math.isfinite(cost):
         parts.append(f"cost of transport {cost:.3g}")
     return [Part(f"{begin}: {', '.join(parts)}." if parts else f"{begin}.")]
-
-
-def _drop_part(drop: Drop, simulated: float) -> Part:
-    """Returns the headline of a drop: the restitution delivered and the one asked for."""
-    asked, first = drop.asked, drop.bounces[0]
-    text = (
-        f"Drop, {simulated:.4g} s: restitution {first.restitution:.3g} delivered at "
-        f"{first.speed:.3g} m/s"
-    )
-    return Part(f"{text}, {asked:.3g} asked for." if asked is not None else f"{text}.")

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from contextlib import suppress
 from typing import Any
 
 from hexapod_cosim.cosim.common.control_style import control_styles
-from hexapod_cosim.cosim.master.recorder import ColumnError
-from hexapod_cosim.cosim.report.columns import MOST_ROWS, Chosen, choose
+from hexapod_cosim.cosim.report.columns import MOST_ROWS, Array, Columns, choose
 from hexapod_cosim.cosim.report.geometry import (
     describe_ground,
     describe_robot,
-    pack_footprints,
     pack_surface,
     stride,
 )
 from hexapod_cosim.cosim.report.packing import pack
 from hexapod_cosim.cosim.results.folder import StoredResult
-from hexapod_cosim.cosim.results.footprints import find_footprints
 from hexapod_cosim.cosim.results.window import CONTACT_SHARE
 from hexapod_cosim.models.ground.surface import Surface
 
@@ -34,9 +30,6 @@ def make_payload(
     Those are runs with more than `most_rows` rows.
     """
     chosen = {label: choose(run.view, most_rows=most_rows) for label, run in runs.items()}
-    thinned = [
-        _note(label, run, chosen[label]) for label, run in runs.items() if chosen[label].bucket > 1
-    ]
     surfaces = list(
         dict.fromkeys(run.view.surface for run in runs.values() if run.view.surface is not None)
     )
@@ -47,12 +40,16 @@ def make_payload(
         "surfaces": [pack_surface(surface, parameters) for surface in surfaces],
         "runs": [
             {"key": styles[label].key, "dash": [DASH * part for part in styles[label].dash]}
-            | _describe(label, run, chosen[label], surfaces)
+            | _describe(label, run, surfaces, chosen[label])
             for label, run in runs.items()
         ],
     }
-    thinned += [_coarse(surface) for surface in surfaces if stride(surface) > 1]
-    return content, thinned
+    notes = [
+        f"{label}: the page has every {every}. of {len(runs[label].view.recording.time)} rows."
+        for label, (_, _, every) in chosen.items()
+        if every > 1
+    ]
+    return content, notes + [_coarse(surface) for surface in surfaces if stride(surface) > 1]
 
 
 def as_json(payload: Mapping[str, Any]) -> str:
@@ -61,18 +58,14 @@ def as_json(payload: Mapping[str, Any]) -> str:
 
 
 def _describe(
-    label: str, run: StoredResult, chosen: Chosen, surfaces: list[Surface]
+    label: str, run: StoredResult, surfaces: list[Surface], chosen: tuple[Array, Columns, int]
 ) -> dict[str, Any]:
-    view = run.view
-    about = {"label": label, "period": view.period, "bucket": chosen.bucket}
+    view, (time, columns, _) = run.view, chosen
     ground: dict[str, Any] = describe_ground(view.parameters)
-    if run.view.surface is not None:
-        ground["surface"] = surfaces.index(run.view.surface)
-    with suppress(ColumnError):
-        ground["footprints"] = pack_footprints(find_footprints(view.recording, view.parameters))
-    return (
-        about | {"robot": describe_robot(run), "ground": ground} | pack(chosen.time, chosen.columns)
-    )
+    if view.surface is not None:
+        ground["surface"] = surfaces.index(view.surface)
+    about = {"label": label, "period": view.period, "robot": describe_robot(run), "ground": ground}
+    return about | pack(time, columns)
 
 
 def _coarse(surface: Surface) -> str:
@@ -81,14 +74,4 @@ def _coarse(surface: Surface) -> str:
     return (
         f"The ground has {surface.height.size} heights around the walk, too many for a page: the "
         f"replay draws every {every}. of them along x and y."
-    )
-
-
-def _note(label: str, run: StoredResult, chosen: Chosen) -> str:
-    """Returns a note on how the rows of a run were reduced."""
-    rows = len(run.view.recording.time)
-    return (
-        f"{label}: {rows} rows were recorded, too many for a page. Curves show the least and the "
-        f"largest value of every {chosen.bucket} rows, so that no peak is lost; "
-        f"the replay shows {len(chosen.time)} of the rows."
     )

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from hexapod_cosim.controller.figure_style import PALETTE, WIDTH
 from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.master.recorder import ColumnError
-from hexapod_cosim.cosim.report.profile import make_profile
+from hexapod_cosim.cosim.report.profile import profile
 from hexapod_cosim.cosim.results.metrics import planned_feet, plans_feet
 from hexapod_cosim.cosim.results.support import body_height, real_feet
 from hexapod_cosim.cosim.results.window import (
@@ -27,7 +27,6 @@ from hexapod_cosim.cosim.results.window import (
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 PLAN = "0.7"  # grey of planned paths
-BAND, GROUND = "0.88", "0.35"  # greys of the height profile
 PLANNED = "0.85"  # grey of planned swings
 LEAST_WIDTH = 2.0  # mm    of the sideways axis: a smaller one would show round-off as a drift
 STRAIGHT = 0.05  # a commanded path no wider than this share of its length is drawn enlarged
@@ -162,41 +161,6 @@ def path(views: Views) -> Figure:
     axis.set_ylim(low - missing / 2, high + missing / 2)
     axis.set_title("not to scale: mm upwards, m along", loc="right", fontsize="small")
     return figure
-
-
-def profile(views: Views) -> Figure:
-    """Draws the ground along the torso's path of each run, and where its feet touched down.
-
-    Raises ColumnError where no run was on a surface.
-    """
-    styles = line_styles(views)
-    shown = {label: view for label, view in views.items() if view.surface is not None}
-    if not shown:
-        raise ColumnError("not recorded", got="a surface")
-    figure = Figure(figsize=(WIDTH, 0.4 + 1.8 * len(shown)))
-    axes = np.atleast_1d(figure.subplots(len(shown), 1, sharex=True, sharey=True))
-    for axis, (label, view) in zip(axes, shown.items(), strict=True):
-        _draw_profile(axis, label, view, styles[label]["color"])
-    axes[-1].set_xlabel("way along the path [m]")
-    _legend(figure, axes[0])
-    return figure
-
-
-def _draw_profile(axis: Axes, label: str, view: View, colour: str) -> None:
-    """Draws one run's ground: a line below the torso, a band across the robot's width."""
-    if view.surface is None:
-        return
-    found = make_profile(view, view.surface)
-    band: dict[str, Any] = {"color": BAND, "linewidth": 0, "label": "across the robot's width"}
-    axis.fill_between(found.way, 1e3 * found.low, 1e3 * found.high, **band)
-    axis.plot(found.way, 1e3 * found.ground, color=GROUND, linewidth=1.1, label="below the torso")
-    dots: dict[str, Any] = {"marker": "o", "markersize": 2.6, "linestyle": "none"}
-    axis.plot(
-        found.contact_way, 1e3 * found.contact_height, color=colour, label="feet touch down", **dots
-    )
-    axis.set_title(label)
-    axis.set_ylabel("height [mm]")
-    axis.margins(x=0.0)
 
 
 def torques(views: Views) -> Figure:

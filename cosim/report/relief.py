@@ -11,7 +11,6 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LightSource, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
-from PIL import Image
 
 from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED
 from hexapod_cosim.cosim.common.files import atomic_path
@@ -28,7 +27,6 @@ SAMPLES = 4  # drawn per cell and direction of a small map
 MOST_SAMPLES = 400  # along an edge
 STEPS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # m
 CONTOURS = 12  # at most
-LEVELS = 65535  # of a 16-bit picture
 
 
 def draw_relief(surface: Surface, robot: Robot, path: Path) -> Path:
@@ -118,27 +116,3 @@ def draw_robot(axes: Axes, robot: Robot) -> None:
     axes.add_patch(Rectangle(corner, length, width, fill=False, color="#D55E00", linewidth=1.0))
     for x, y, _ in foot_positions(robot, robot.stance):
         axes.add_patch(Circle((x, y), robot.foot.radius, color="#D55E00"))
-
-
-def write_heights(surface: Surface, path: Path) -> dict[str, float]:
-    """Writes a surface's heights as a 16-bit PNG, and returns the keys of [terrain] to read it.
-
-    Levels are multiples of vertical_scale above the lowest height.
-    """
-    lowest = float(surface.height.min())
-    span = float(surface.height.max()) - lowest
-    scale = max(span / LEVELS, 1e-6)
-    levels = np.round((surface.height - lowest) / scale).astype(np.uint16)
-    with atomic_path(path) as part:
-        Image.fromarray(levels[::-1]).save(part, "PNG", optimize=True)
-    left, right, low, high = surface.extent
-    keys = {
-        "horizontal_scale": surface.cell,
-        "vertical_scale": scale,
-        "height": lowest,
-        "x": 0.5 * (left + right),
-        "y": 0.5 * (low + high),
-    }
-    if surface.kind == "blocks":
-        keys["slope_threshold"] = float(f"{scale / surface.cell:.3g}")
-    return keys

@@ -39,6 +39,7 @@ from hexapod_cosim.cosim.results.metrics import plans_feet
 from hexapod_cosim.cosim.results.side_by_side import Comparisons
 from hexapod_cosim.models import JOINT_NAMES
 
+ALL_FORMATS = ("svg", "png")  # of figures
 REPORT, PLOTS, PROFILE = "report.html", "plots", "profile"
 STATIC = "static"  # of a section: its figure alone, without plots of the viewer
 
@@ -75,8 +76,7 @@ SECTIONS = (
     Section(
         "profile",
         "Height profile",
-        "The ground along the torso's path: the line below the torso, the band from the lowest to "
-        "the highest ground across the robot's width; dots where feet touched down.",
+        "The ground below the torso along its path; dots where feet touched down.",
         STATIC,
     ),
     Section("torques", "Torques", "The largest absolute torque over the six legs, joint by joint."),
@@ -113,6 +113,7 @@ def write_report(
     walks: Sequence[str] = (),
     accuracies: Mapping[str, Accuracy] = MappingProxyType({}),
     figures: Figures | None = None,
+    formats: Sequence[str] = ("svg",),
 ) -> list[Path]:
     """Writes the figures and report.html; returns the files, the report last.
 
@@ -125,77 +126,69 @@ def write_report(
         walks: sentences on the gait and stance of each control of a comparison, if they differ.
         accuracies: by control, where they were checked.
         figures: those of the runs; by default they are drawn now.
+        formats: of the figures that are drawn now, among ALL_FORMATS.
     """
     if figures is None:
-        figures = draw_figures({label: run.view for label, run in runs.items()})
-    files, skipped = write_figures(figures, folder / PLOTS), dict(figures.skipped)
-    if all(run.view.surface is None for run in runs.values()):
-        skipped[PROFILE] = ""  # a plane has none, which is no loss
-    if not any(plans_feet(run.view.recording) for run in runs.values()):
-        skipped["feet"] = ""  # a controller need not tell its plan
-    missing = [
-        f"{section.title} is not drawn: {skipped[section.name]}"
-        for section in SECTIONS
-        if skipped.get(section.name)
-    ]
-    for text in missing:
+        figures = draw_figures({label: run.view for label, run in runs.items()}, formats)
+    files, first = write_figures(figures, folder / PLOTS), next(iter(runs.values()))
+    content = _figures(runs, figures, folder / PLOTS)
+    for text in content["missing"]:
         warn(text)
-    first = next(iter(runs.values()))
-    content = _one_run(first) if comparison is None else _comparison(comparison, first.facts)
-    content["warnings"] = [
-        f"{label}: {text}" for label, run in runs.items() for text in run.facts.warnings
-    ] + content.pop("overall")
-    content["events"] = [f"{event['time']:g} s: {event['text']}" for event in first.facts.events]
-    content["scenario"] = first.scenario if scenario is None else scenario
-    content["command"] = first.facts.command if command is None else command
-    metrics = (
-        {label: run.metrics for label, run in runs.items()}
-        if comparison is None
-        else comparison.means
-    )
+    content |= _one_run(first) if comparison is None else _comparison(comparison, first.facts)
     page = render(
         "report.html.jinja",
         controls=runs,
-        keys={label: style.key for label, style in control_styles(runs).items()},
         title=first.facts.title,
-        sections=[section for section in SECTIONS if section.name not in skipped],
-        images={
-            section.name: embedded(folder / PLOTS / f"{section.name}.svg")
-            for section in SECTIONS
-            if section.shape == STATIC and f"{section.name}.svg" in figures.images
-        },
-        missing=missing,
-        servos=servo_rows(runs),
-        joints=JOINT_NAMES,
-        creep=creep_note(first.facts, first.view.surface),
-        walks={label: run.facts.walking.text for label, run in runs.items()},
+        scenario=first.scenario if scenario is None else scenario,
+        command=first.facts.command if command is None else command,
         differences=walks,
-        terrain=describe_terrain(first.view.surface, first.facts.parameters),
-        materials=_materials(runs),
-        **content | _accuracy(content["rows"], accuracies, metrics),
+        **content | _accuracy(content["rows"], accuracies, content["metrics"]),
         **_facts(runs),
+        **_ground(runs),
         **_replay(runs),
     )
     write_text(folder / REPORT, page)
     return [*files, folder / REPORT]
 
 
-def _materials(runs: Mapping[str, StoredResult]) -> list[dict[str, str]]:
-    """Returns the legend's entries for the materials of the runs' surfaces."""
+def _figures(runs: Mapping[str, StoredResult], figures: Figures, folder: Path) -> dict[str, Any]:
+    """Returns the sections of the page, pictures of the static ones, and what is missing."""
+    skipped = dict(figures.skipped)
+    if all(run.view.surface is None for run in runs.values()):
+        skipped[PROFILE] = ""  # a plane has none, which is no loss
+    if not any(plans_feet(run.view.recording) for run in runs.values()):
+        skipped["feet"] = ""  # a controller need not report its plan
+    missing = [
+        f"{section.title} is not drawn: {skipped[section.name]}"
+        for section in SECTIONS
+        if skipped.get(section.name)
+    ]
+    images = {
+        section.name: embedded(folder / f"{section.name}.svg")
+        for section in SECTIONS
+        if section.shape == STATIC and f"{section.name}.svg" in figures.images
+    }
+    shown = [section for section in SECTIONS if section.name not in skipped]
+    return {"sections": shown, "images": images, "missing": missing}
+
+
+def _ground(runs: Mapping[str, StoredResult]) -> dict[str, Any]:
+    """Returns the text on the ground and the legend's entries for its materials."""
+    first = next(iter(runs.values()))
     found = [
         entry
         for run in runs.values()
         if run.view.surface is not None
         for entry in material_legend(run.view.surface, run.view.parameters)
     ]
-    return [entry for k, entry in enumerate(found) if entry not in found[:k]]
+    return {
+        "terrain": describe_terrain(first.view.surface, first.facts.parameters),
+        "materials": [entry for k, entry in enumerate(found) if entry not in found[:k]],
+        "creep": creep_note(first.facts, first.view.surface),
+    }
 
 
-def _accuracy(
-    rows: Rows,
-    accuracies: Mapping[str, Accuracy],
-    metrics: Metrics,
-) -> dict[str, Any]:
+def _accuracy(rows: Rows, accuracies: Mapping[str, Accuracy], metrics: Metrics) -> dict[str, Any]:
     """Returns the parts of the page on accuracy, and the rows of the table with errors."""
     return {
         "accuracy": about_accuracy(accuracies),
@@ -207,16 +200,24 @@ def _accuracy(
 
 def _facts(runs: Mapping[str, StoredResult]) -> dict[str, Any]:
     """Returns the facts of all runs, by control."""
+    facts = {label: run.facts for label, run in runs.items()}
+    events = next(iter(facts.values())).events
     return {
         "labels": list(runs),
-        "facts": {label: run.facts for label, run in runs.items()},
-        "durations": {label: _duration(run.facts) for label, run in runs.items()},
-        "walked": {label: _walked(run.facts) for label, run in runs.items()},
+        "keys": {label: style.key for label, style in control_styles(runs).items()},
+        "facts": facts,
+        "walks": {label: one.walking.text for label, one in facts.items()},
+        "events": [f"{event['time']:g} s: {event['text']}" for event in events],
+        "warnings": [f"{label}: {text}" for label, one in facts.items() for text in one.warnings],
+        "durations": {label: _duration(one) for label, one in facts.items()},
+        "walked": {label: _walked(one) for label, one in facts.items()},
         "gains": {
-            label: tomlkit.dumps(without_none(run.facts.gains))
-            for label, run in runs.items()
-            if run.facts.gains
+            label: tomlkit.dumps(without_none(one.gains))
+            for label, one in facts.items()
+            if one.gains
         },
+        "servos": servo_rows(runs),
+        "joints": JOINT_NAMES,
     }
 
 
@@ -230,10 +231,11 @@ def _one_run(run: StoredResult) -> dict[str, Any]:
         "cards": [],
         "columns": list(metrics),
         "compared": [],
+        "metrics": metrics,
         "rows": rows,
         "about": "",
         "overall": [],
-        "lead": _robot(run.facts),
+        "lead": f"Robot {run.facts.robot.name}, {_duration(run.facts)}.",
     }
 
 
@@ -251,6 +253,7 @@ def _comparison(comparison: Comparisons, facts: RunFacts) -> dict[str, Any]:
         "cards": cards(main),
         "columns": comparison.labels,
         "compared": [pair.title for pair in comparison.pairs],
+        "metrics": comparison.means,
         "rows": rows,
         "about": notes,
         "overall": comparison.warnings if len(comparison.seeds) > 1 else comparison.losses,
@@ -283,8 +286,3 @@ def _walked(facts: RunFacts) -> str:
     if not math.isfinite(speed):
         return simulated
     return f"{simulated} at {1e3 * speed:.3g} mm/s"
-
-
-def _robot(facts: RunFacts) -> str:
-    drop = f" {facts.drop.text}" if facts.drop else ""
-    return f"Robot {facts.robot.name}, {_duration(facts)}.{drop}"

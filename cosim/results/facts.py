@@ -9,7 +9,6 @@ from typing import Any
 
 from hexapod_cosim.cosim.master.loop import COMPLETED, Outcome
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.results.drop import Bounce, Drop
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError
 from hexapod_cosim.models.ground.surface import Surface
@@ -71,7 +70,6 @@ class RunFacts:
     events: tuple[Mapping[str, Any], ...]  # time [s] and text of those that the run reached
     gains: Mapping[str, Any] | None  # None: kinematic control
     walk: Locomotion
-    drop: Drop | None  # None: the run is no drop
     drawn: Mapping[str, Any] | None  # small changes of the seed; None: nothing is varied
     walking: GaitChoice
     terrain: Mapping[str, Any]  # keys of [terrain] that made the surface; empty for a plane
@@ -95,7 +93,6 @@ def facts_from_table(table: Mapping[str, Any], *, where: str) -> RunFacts:
             "warnings": tuple(table["warnings"]),
             "events": tuple(table["events"]),
             "walk": Locomotion(**{**walk, **known}),
-            "drop": _drop(table["drop"]),
             "walking": GaitChoice(**table["walking"]),
         }
         return RunFacts(**{**given, **records})
@@ -107,14 +104,6 @@ def facts_from_table(table: Mapping[str, Any], *, where: str) -> RunFacts:
             fix="run the scenario again",
             where=where,
         ) from error
-
-
-def _drop(table: Mapping[str, Any] | None) -> Drop | None:
-    """Returns the drop of a table; None for None."""
-    if table is None:
-        return None
-    bounces = tuple(Bounce(**bounce) for bounce in table["bounces"])
-    return Drop(table["asked"], table["of_the_law"], bounces)
 
 
 def _number(value: float | None) -> float:

@@ -9,9 +9,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hexapod_cosim.cosim.interface.names import joint_names, vector_names
+from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.results.footprints import sinkage_warnings
 from hexapod_cosim.cosim.results.locomotion import fallback_columns
 from hexapod_cosim.cosim.results.summary import FIX, Unbalanced
 from hexapod_cosim.cosim.results.support import ground_normal
@@ -20,7 +19,8 @@ from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, Robot
 from hexapod_cosim.models.friction import BRISTLE_LAWS
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import SELF_CONTACTS, Servo
+from hexapod_cosim.models.records import SELF_CONTACTS, Foot, Servo
+from hexapod_cosim.models.soil.law import soil_radius
 from hexapod_cosim.models.statics import sliding
 
 
@@ -103,6 +103,30 @@ def walk_warnings(view: View, robot: Robot) -> list[str]:
     found += overlap_warnings(recording, view.parameters)
     found += sinkage_warnings(recording, view.parameters)
     return [*found, *run_balance_warnings(view.energy_residual)]
+
+
+def sinkage_warnings(recording: Recording, parameters: Mapping[str, float]) -> list[str]:
+    """Warns of a foot that sinks into soil deeper than the radius of its sphere or pad.
+
+    The laws of soil count the foot alone; deeper than that the leg above it is in the soil, too.
+    """
+    names = foot_names("sinkage")
+    if not len(recording.time) or not set(names) <= set(recording.names):
+        return []
+    depth, pad = recording.columns(names), parameters.get("foot.pad_radius", 0.0)
+    foot = Foot(radius=parameters["foot.radius"], pad_radius=pad, youngs_modulus=1.0, poisson=0.0)
+    radius = soil_radius(foot)
+    if not depth.max() > radius:
+        return []
+    row, leg = np.unravel_index(int(np.argmax(depth)), depth.shape)
+    kind, deepest = "pad" if pad else "sphere", float(depth[row, leg])
+    return [
+        f"foot {LEG_NAMES[leg]} sinks too deep: got {1e3 * deepest:.3g} mm at "
+        f"{recording.time[row]:.3f} s, expected at most the radius of its {kind}, "
+        f"{1e3 * radius:.3g} mm; the soil's law counts the foot alone and not the leg above it, so "
+        "depth and slip are not reliable; give the feet larger pads (foot.pad_radius), or walk on "
+        "firmer soil"
+    ]
 
 
 def overlap_warnings(recording: Recording, parameters: Mapping[str, float]) -> list[str]:

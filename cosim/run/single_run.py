@@ -31,7 +31,6 @@ from hexapod_cosim.cosim.master.loop import (
 from hexapod_cosim.cosim.master.recorder import Recorder, chosen_columns
 from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.results.drop import describe_drop
 from hexapod_cosim.cosim.results.facts import FmuIdentity, Result, RobotIdentity, RunFacts
 from hexapod_cosim.cosim.results.locomotion import (
     describe_fall,
@@ -48,7 +47,7 @@ from hexapod_cosim.cosim.results.warnings import (
     unused_settings,
     walk_warnings,
 )
-from hexapod_cosim.cosim.results.window import View
+from hexapod_cosim.cosim.results.window import View, is_drop
 from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
 from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant, run_surface
 from hexapod_cosim.cosim.scenario.controls import control_of
@@ -158,12 +157,12 @@ def make_result(
     """
     scenario, setup, drawn = plan.scenario, plan.controller, plan.drawn
     view = View(outcome.judged, parameters, setup.gait.period)
-    missing, drop = list[str](), describe_drop(replace(view, recording=outcome.recording))
+    missing = list[str]()
     fall = describe_fall(view, setup.robot)
     if outcome.status == COMPLETED:
         missing = short_run_warnings(view)
-        # a drop neither walks nor swings a foot, and has the metrics of a drop
-        missing += missing_metrics_warnings(view) if drop is None else []
+        # a drop neither walks nor swings a foot
+        missing += [] if is_drop(view.recording) else missing_metrics_warnings(view)
     metrics = compute_metrics(view, servo=plan.robot.servo, realtime_factor=outcome.realtime_factor)
     arrives = outcome.status != COMPLETED or not is_sent_ahead(view)
     missed = "" if arrives else missed_end(metrics)
@@ -194,7 +193,6 @@ def make_result(
         events=tuple(event_log(scenario, outcome.simulated)),
         gains=None if setup.gains is None else setup.gains.as_facts(),
         walk=locomotion_of(view, upright=not fall, missed=missed),
-        drop=drop,
         drawn=None if drawn is None else drawn.as_facts(),
         walking=plan.selection.as_facts(),
         terrain={} if surface is None else dict(surface.recipe),

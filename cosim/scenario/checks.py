@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import fields
 
 from hexapod_cosim.controller import Parts
 from hexapod_cosim.cosim.interface.plant import load_interface
@@ -66,16 +65,16 @@ def check_interval(scenario: Scenario) -> None:
 
 
 def check_servo_faults(scenario: Scenario, robot: Robot) -> None:
-    """Refuses dead servos of kinematic drives, which move by prescribed angles without torques.
+    """Refuses faults of kinematic drives, which move by prescribed angles without torques.
 
     Raises ScenarioError.
     """
-    dead = [event for event in scenario.servo_faults if event.fault == "dead"]
-    if dead and robot.servo.mode == "kinematic":
+    faults = scenario.servo_faults
+    if faults and robot.servo.mode == "kinematic":
         raise ScenarioError(
-            "a dead servo of a kinematic drive",
-            got=f"{dead[0].leg}.{dead[0].joint} dead at {dead[0].time:g} s",
-            expected="servo.mode torque, or the fault stuck",
+            "a fault of a servo of a kinematic drive",
+            got=f"{faults[0].leg}.{faults[0].joint} {faults[0].fault} at {faults[0].time:g} s",
+            expected="servo.mode torque or position",
             fix="set servo.mode=torque",
             where=f"{scenario.where}: events",
         )
@@ -137,6 +136,7 @@ def _unknown(kind: str, name: str, valid: list[str], expected: str, *, where: st
 def setting_names() -> list[str]:
     """Returns the scenario's dotted keys."""
     records = {"command": Command, "sensors": Sensors, "variation": Variation, **SETTINGS}
+    records |= {"outputs": Outputs, "compliance": Parts}
     keys = [("terrain", key) for key in (*terrain_specs(), "patch")]
     keys += [
         (section, key)
@@ -144,7 +144,5 @@ def setting_names() -> list[str]:
         for key in specs(record)
         if section != "terrain" and key not in UNUSED.get(section, ())
     ]
-    plain = {"outputs": Outputs, "compliance": Parts}
-    keys += [(section, item.name) for section, record in plain.items() for item in fields(record)]
     keys += [("walk", key) for key in WALK_KEYS]
     return [f"{section}.{key}" for section, key in keys]

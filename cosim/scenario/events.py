@@ -9,6 +9,7 @@ from typing import Any
 from hexapod_cosim.cosim.scenario.records import (
     ANGLE,
     ATTITUDE,
+    WHOLE_LEG,
     AngleFault,
     AttitudeFault,
     Event,
@@ -19,30 +20,43 @@ from hexapod_cosim.cosim.scenario.records import (
     SensorFault,
     ServoFault,
 )
-from hexapod_cosim.cosim.scenario.values import read_list, read_record
 from hexapod_cosim.models import ScenarioError
-from hexapod_cosim.models.schema import Choice, expect_table, refuse_unknown_keys, specs
+from hexapod_cosim.models.schema import (
+    Choice,
+    expect_table,
+    read_record,
+    refuse_unknown_keys,
+    specs,
+)
 
 SENSOR_TEXTS = {
     "dead": "reads zero",
     "stuck": "repeats its last reading",
     "nan": "reads NaN",
     "late": "is late by {delay:g} ms",
+    "noisy": "has a noise of {noise:g} %",
 }
 LOST_TEXTS = {
     "command": "the joint commands are lost, and the last one holds",
     "step": "macro-steps are dropped: the last readings and joint commands hold",
 }
 SERVO_TEXTS = {
-    "dead": "is dead: it follows the joint without torque",
-    "stuck": "is stuck: it holds the angle of that moment",
+    "weak": "gives {share:g} of its torque",
+    "limp": "is limp",
+    "locked": "is locked",
+    "dead": "is limp",
+    "stuck": "is locked",
 }
 
 
 def read_events(value: Any) -> tuple[Event, ...]:
     """Reads the entries [[events]]. Raises ScenarioError."""
-    entries = read_list(value, "events")
-    return tuple(_read_event(entry, f"events[{k}]") for k, entry in enumerate(entries))
+    if not isinstance(value, list | tuple):
+        fix = "write [[events]] with two brackets"
+        raise ScenarioError(
+            "wrong type", got=value, expected="entries [[events]]", fix=fix, where="events"
+        )
+    return tuple(_read_event(entry, f"events[{k}]") for k, entry in enumerate(value))
 
 
 def _read_event(table: Any, where: str) -> Event:
@@ -105,7 +119,10 @@ def describe_event(event: Event) -> str:
         case AttitudeFault():
             text = f"the attitude sensor {_reading(event)}"
         case ServoFault():
-            text = f"the servo of {event.leg}.{event.joint} {SERVO_TEXTS[event.fault]}"
+            which = f"servo of {event.leg}.{event.joint}"
+            if event.joint == WHOLE_LEG:
+                which = f"leg {event.leg}"
+            text = f"the {which} {SERVO_TEXTS[event.fault].format(share=event.share)}"
         case Lost():
             text = LOST_TEXTS[event.lost]
     return text if math.isinf(event.duration) else f"{text}, for {event.duration:g} s"
@@ -115,7 +132,8 @@ def _reading(event: SensorFault) -> str:
     """Returns what a faulty sensor reads."""
     if isinstance(event, AttitudeFault) and event.fault == "dead":
         return "reads level and at rest"
-    return SENSOR_TEXTS[event.fault].format(delay=1000.0 * event.delay)
+    noise = 100.0 * event.noise if isinstance(event, Fault) else 0.0
+    return SENSOR_TEXTS[event.fault].format(delay=1000.0 * event.delay, noise=noise)
 
 
 def _vector(values: tuple[float, ...]) -> str:

@@ -1,8 +1,7 @@
 """Reads scenarios from TOML files and checks them key by key.
 
-A value is a number in SI units or a quantity with its unit ("5 ms"). The settings of gait, terrain,
-contact, friction, servo, solver and baumgarte are those of robot files; a scenario gives only what
-differs from the robot's own.
+The settings of gait, terrain, contact, friction, servo, solver and baumgarte are those of robot
+files; a scenario gives only what differs from the robot's own.
 
 `gravity` is a number, along -z, or a vector in world axes [m/s2]. Plant and controller both use it:
 the pose of rest, the gains' design, the planned loads and the weight in the metrics follow from it.
@@ -19,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from hexapod_cosim.controller import Parts
 from hexapod_cosim.cosim.scenario.checks import check_interval, check_parameters, check_steps
 from hexapod_cosim.cosim.scenario.controls import read_control
 from hexapod_cosim.cosim.scenario.events import read_events
@@ -29,33 +29,31 @@ from hexapod_cosim.cosim.scenario.records import (
     KEYS,
     PLAIN_KEYS,
     SETTINGS,
+    Outputs,
     Scenario,
     Sensors,
     Variation,
 )
 from hexapod_cosim.cosim.scenario.sections import (
+    errors_of,
     read_commands,
     read_gravity,
-    read_outputs,
-    read_parts,
     read_setting,
     read_walk,
 )
 from hexapod_cosim.cosim.scenario.tables import read_tables, with_overrides
-from hexapod_cosim.cosim.scenario.values import (
-    errors_of,
-    read_given_keys,
-    read_record,
-    read_seed,
-    read_text,
-    to_si,
-)
 from hexapod_cosim.models import Robot, ScenarioError, load_robot
 from hexapod_cosim.models.friction import STATIC_LAWS
 from hexapod_cosim.models.ground.faces import ground_normal
 from hexapod_cosim.models.ground.table import merged_terrain
 from hexapod_cosim.models.records import Terrain
-from hexapod_cosim.models.schema import Number, expect_table, refuse_unknown_keys, require
+from hexapod_cosim.models.schema import (
+    Number,
+    expect_table,
+    read_given,
+    read_record,
+    refuse_unknown_keys,
+)
 from hexapod_cosim.models.servos.presets import changed_servo
 from hexapod_cosim.models.validation.bodies import check_settings
 
@@ -81,15 +79,12 @@ def scenario_from_table(
     """
     with errors_of(where):
         refuse_unknown_keys(table, list(KEYS), "")
-        plain_keys = {key: value for key, value in table.items() if key in PLAIN_KEYS}
-        plain = require(Scenario, read_given_keys(Scenario, plain_keys, ""), "")
+        plain = {key: value for key, value in table.items() if key in PLAIN_KEYS}
+        plain = {"title": Path(where).stem, **read_given(Scenario, plain, "")}
         control, parameters = read_control(table.get("control", CONTROLS[0]), "control")
         scenario = Scenario(
-            title=read_text(table, "title", Path(where).stem),
-            robot=read_text(table, "robot", "athena"),
             control=control.text,
             control_settings=parameters,
-            seed=read_seed(table.get("seed", 0)),
             gravity=read_gravity(table["gravity"], "gravity") if "gravity" in table else None,
             settings={
                 name: read_setting(name, table[name], name) for name in SETTINGS if name in table
@@ -98,11 +93,11 @@ def scenario_from_table(
             events=read_events(table.get("events", [])),
             sensors=read_record(Sensors, table.get("sensors", {}), "sensors"),
             walk=read_walk(table.get("walk", {}), "walk"),
-            compliance=read_parts(table.get("compliance", {}), "compliance"),
+            compliance=read_record(Parts, table.get("compliance", {}), "compliance"),
             variation=read_record(Variation, table["variation"], "variation")
             if "variation" in table
             else None,
-            outputs=read_outputs(table.get("outputs", {}), "outputs"),
+            outputs=read_record(Outputs, table.get("outputs", {}), "outputs"),
             parameters=dict(expect_table(table.get("parameters", {}), "parameters")),
             where=where,
             **plain,
@@ -124,8 +119,8 @@ def _with_gravity_of_parameters(scenario: Scenario) -> Scenario:
     )
     with errors_of(scenario.where):
         for name in names:
-            value = to_si(scenario.parameters[name], NUMBER, f"parameters.{name}")
-            gravity[GRAVITY_NAMES.index(name)] = NUMBER.read(value, f"parameters.{name}")
+            value = NUMBER.read(scenario.parameters[name], f"parameters.{name}")
+            gravity[GRAVITY_NAMES.index(name)] = value
     rest = {name: value for name, value in scenario.parameters.items() if name not in names}
     return replace(scenario, gravity=(gravity[0], gravity[1], gravity[2]), parameters=rest)
 

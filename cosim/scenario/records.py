@@ -22,13 +22,16 @@ from hexapod_cosim.models import (
     Solver,
     Terrain,
 )
-from hexapod_cosim.models.schema import Choice, Number, Vector, specs
+from hexapod_cosim.models.schema import Choice, Flag, Number, Text, Texts, Vector, Whole, specs
 
 CONTROLS = ("kinematic", "paper", "compliant")
 COMPARED = ("kinematic", "compliant")  # unless a command or a study names its controls
 FAULTS = ("dead", "stuck", "nan", "late")  # of sensors
+NOISY = "noisy"  # a further one of force sensors
 ANGLE, ATTITUDE = "angle", "attitude"  # sensors inside the robot
-SERVO_FAULTS = ("dead", "stuck")
+# of servos; dead and stuck are older names of limp and locked
+SERVO_FAULTS = ("weak", "limp", "locked", "dead", "stuck")
+WHOLE_LEG = "all"  # joints
 LOST = ("command", "step")
 DELAY = Number("s", at_least=0.0, at_most=1.0)  # of late readings
 FORMATS = ("parquet", "csv", "mcap")  # of recordings
@@ -45,8 +48,6 @@ SETTINGS: dict[str, type[Any]] = {
 }
 UNUSED = {"gait": ("stride",)}  # keys of robot files that scenarios replace by the body command
 GRAVITY = Number("m/s2", above=0.0)  # along -z; or three numbers, a vector in world axes
-# weight of the torques in the planned squeeze of the legs
-SQUEEZE = Number("1", at_least=0.0, at_most=0.99)
 GRAVITY_VECTOR = Vector("m/s2", 3)
 GRAVITY_NAMES = ("gravity[1]", "gravity[2]", "gravity[3]")  # the FMU's parameters
 ZERO = (0.0, 0.0, 0.0)
@@ -83,13 +84,14 @@ class Fault:
 
     A dead sensor reads zero, a stuck one repeats its last reading, and nan is no number. A late one
     reads what it should have read `delay` earlier, rounded up to whole macro-steps, or else at the
-    start of the run.
+    start of the run. A noisy one has this noise: a standard deviation, as a share of the force.
     """
 
     time: Annotated[float, Number("s", at_least=0.0)]
     leg: Annotated[str, Choice(LEG_NAMES)]
-    fault: Annotated[str, Choice(FAULTS)]
+    fault: Annotated[str, Choice((*FAULTS, NOISY))]
     delay: Annotated[float, DELAY] = 0.0
+    noise: Annotated[float, Number("1", at_least=0.0)] = 0.1
     duration: Annotated[float, Number("s", above=0.0)] = math.inf
 
 
@@ -125,14 +127,15 @@ class AttitudeFault:
 class ServoFault:
     """A fault of a joint's servo from `time` [s from the start of the run].
 
-    A dead servo follows the joint: its command is the measured angle and speed, without torque. A
-    stuck one holds the angle that was measured when the fault began.
+    A weak servo gives a share of its largest torque, a limp one none; a locked joint stays at the
+    angle that it has when the fault begins (the plant's inputs `strength` and `lock`).
     """
 
     time: Annotated[float, Number("s", at_least=0.0)]
     leg: Annotated[str, Choice(LEG_NAMES)]
-    joint: Annotated[str, Choice(JOINT_NAMES)]
+    joint: Annotated[str, Choice((*JOINT_NAMES, WHOLE_LEG))]
     fault: Annotated[str, Choice(SERVO_FAULTS)]
+    share: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.5  # of a weak one
     duration: Annotated[float, Number("s", above=0.0)] = math.inf
 
 
@@ -207,9 +210,9 @@ class Outputs:
     """Which files and columns a run writes."""
 
     # patterns of variable names, for the columns of results.csv; Parquet has all columns
-    csv: tuple[str, ...] = ("*",)
-    formats: tuple[str, ...] = field(default_factory=default_formats)
-    plots: bool = True
+    csv: Annotated[tuple[str, ...], Texts()] = ("*",)
+    formats: Annotated[tuple[str, ...], Texts(FORMATS)] = field(default_factory=default_formats)
+    plots: Annotated[bool, Flag()] = True
     # time between two rows of the recording; 0: every macro-step. Metrics use all macro-steps
     interval: Annotated[float, Number("s", at_least=0.0)] = 0.0
 
@@ -218,8 +221,8 @@ class Outputs:
 class Scenario:
     """One run. It is complete but for the robot file that it names."""
 
-    title: str = "walk"
-    robot: str = "athena"  # a name of `hexapod list robots`, or a path
+    title: Annotated[str, Text()] = "walk"
+    robot: Annotated[str, Text()] = "athena"  # a name of `hexapod list robots`, or a path
     # text of a control: a name of CONTROLS, law.py:Class or controller.fmu, see controls.py
     control: str = "kinematic"
     # the other keys of a table [control]: parameters of the user's law or FMU
@@ -227,7 +230,7 @@ class Scenario:
     start: Annotated[float, Number("s")] = 0.0
     duration: Annotated[float, Number("s", above=0.0)] = 10.0
     macro_step: Annotated[float, Number("s", above=0.0, at_most=0.1)] = DEFAULT_PERIOD
-    seed: int = 0
+    seed: Annotated[int, Whole()] = 0
     gravity: tuple[float, float, float] | None = None  # m/s2    None: the robot's own
     walk: Walk = Walk()
     settings: Mapping[str, Mapping[str, Any]]  # differences from the robot file, by section
@@ -288,8 +291,8 @@ class Scenario:
 
     def to_table(self) -> dict[str, Any]:
         """Returns the scenario as the tables of an equivalent scenario file."""
-        keys = ("title", "robot", "control", *PLAIN_KEYS, "seed")
-        plain = {key: getattr(self, key) for key in keys}
+        names = [item.name for item in fields(self)]
+        plain = {key: getattr(self, key) for key in names if key in ("control", *PLAIN_KEYS)}
         plain |= {} if self.gravity is None else {"gravity": list(self.gravity)}
         tables = {key: dict(value) for key, value in self.settings.items() if value}
         if self.walk.stance is not None:
@@ -312,21 +315,24 @@ class Scenario:
         )
 
 
-PLAIN_KEYS = tuple(specs(Scenario))  # start, duration, macro_step
+PLAIN_KEYS = tuple(specs(Scenario))  # title, robot, start, duration, macro_step, seed
 SECTIONS = (
     *("command", "control", "walk", "sensors", "compliance", "variation", "outputs", "parameters"),
     *SETTINGS,
 )
-KEYS = ("title", "robot", *PLAIN_KEYS, "seed", "gravity", "events", *SECTIONS)
+KEYS = (*PLAIN_KEYS, "gravity", "events", *SECTIONS)
+
+
+UNUSED_SETTINGS = (("delay", 0.0), ("noise", 0.1), ("share", 0.5))
 
 
 def _as_table(record: Any) -> dict[str, Any]:
-    """Returns the fields of a record, without an infinite duration and a delay of 0, which files
-    omit.
+    """Returns the fields of a record, without an infinite duration and unused settings of faults,
+    which files omit.
     """
     table = {item.name: getattr(record, item.name) for item in fields(record)}
     return {
         key: value
         for key, value in table.items()
-        if value != math.inf and (key, value) != ("delay", 0.0)
+        if value != math.inf and (key, value) not in UNUSED_SETTINGS
     }

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from hexapod_cosim.controller import BodyCommand
 from hexapod_cosim.cosim.scenario.records import (
     FAULTS,
-    SERVO_FAULTS,
+    NOISY,
+    WHOLE_LEG,
     AngleFault,
     AttitudeFault,
     Command,
@@ -27,6 +28,9 @@ from hexapod_cosim.cosim.scenario.records import (
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 ROUND_OFF = 5e-10  # s    of the time of a macro-step
+# strength and lock
+LIMP, LOCKED = (0.0, 0.0), (1.0, 1.0)
+SERVO_STATES = {"limp": LIMP, "dead": LIMP, "locked": LOCKED, "stuck": LOCKED}
 STUCK = FAULTS.index("stuck") + 1  # the kind of a sensor that repeats its last reading
 
 
@@ -36,6 +40,7 @@ class SensorFaults:
 
     kind: NDArray[np.int8]  # (steps + 1, n) 0: none, else 1 + index in FAULTS
     delay: NDArray[np.int32]  # (steps + 1, n) macro-steps, of late readings
+    noise: NDArray[np.float64]  # (steps + 1, n) of noisy sensors: a share of the reading
 
 
 @dataclass(frozen=True)
@@ -49,8 +54,8 @@ class Schedule:
     # (steps, 6) force [N] and torque [N m] on the torso, world axes; None: no pushes
     pushes: NDArray[np.float64] | None
     faults: SensorFaults | None  # of the feet's force sensors, in the order of the legs
-    # (steps + 1, 6, 3) faults of the servos: 0 none, else 1 + index in SERVO_FAULTS; None: none
-    servo_faults: NDArray[np.int8] | None = None
+    # (steps, 36) the plant's inputs strength, then lock, leg by leg; None: healthy servos
+    servos: NDArray[np.float64] | None = None
     lost: NDArray[np.bool_] | None = None  # (steps + 1,) the command is lost; None: none are
     # of the joints' sensors (18, leg by leg), of the attitude sensor (1)
     angle_faults: SensorFaults | None = None
@@ -84,7 +89,7 @@ def make_schedule(scenario: Scenario) -> Schedule:
         np.vstack([rows, rows[-1:]]),
         pushes,
         force,
-        servo_fault_rows(scenario.servo_faults, times) if scenario.servo_faults else None,
+        servo_rows(scenario.servo_faults, begins) if scenario.servo_faults else None,
         lost_rows(scenario.lost, times) if scenario.lost else None,
         angle,
         attitude,
@@ -129,13 +134,15 @@ def fault_rows(
         return None
     kind = np.zeros((len(times), sensors), dtype=np.int8)
     delay = np.zeros((len(times), sensors), dtype=np.int32)
-    h = times[1] - times[0]
+    noise, h = np.zeros((len(times), sensors)), times[1] - times[0]
     for fault in faults:
         place = _span(fault, times), _sensor(fault)
-        kind[place] = FAULTS.index(fault.fault) + 1
+        noisy = isinstance(fault, Fault) and fault.fault == NOISY
+        noise[place] = fault.noise if isinstance(fault, Fault) and noisy else 0.0
+        kind[place] = 0 if noisy else FAULTS.index(fault.fault) + 1
         delay[place] = math.ceil((fault.delay - ROUND_OFF) / h)
     kind[dropped] = STUCK
-    return SensorFaults(kind, delay)
+    return SensorFaults(kind, delay, noise)
 
 
 def _sensor(fault: SensorFault) -> int:
@@ -149,15 +156,23 @@ def _sensor(fault: SensorFault) -> int:
             return 0
 
 
-def servo_fault_rows(faults: Sequence[ServoFault], times: NDArray[np.float64]) -> NDArray[np.int8]:
-    """Returns the fault of each servo at each time [s from the start] (times, 6, 3), as
-    `fault_rows`.
+def healthy_servos() -> NDArray[np.float64]:
+    """Returns strength and lock (36,) of servos without faults."""
+    return np.repeat([1.0, 0.0], len(LEG_NAMES) * len(JOINT_NAMES))
+
+
+def servo_rows(faults: Sequence[ServoFault], times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns strength and lock of all servos in the steps that begin at times [s from the start]
+    (times, 36). Where faults of a servo overlap, the last one in the list holds.
     """
-    rows = np.zeros((len(times), len(LEG_NAMES), len(JOINT_NAMES)), dtype=np.int8)
+    shape = len(times), 2, len(LEG_NAMES), len(JOINT_NAMES)
+    rows = np.tile(healthy_servos(), (len(times), 1)).reshape(shape)
     for fault in faults:
-        joint = LEG_NAMES.index(fault.leg), JOINT_NAMES.index(fault.joint)
-        rows[(_span(fault, times), *joint)] = SERVO_FAULTS.index(fault.fault) + 1
-    return rows
+        state = SERVO_STATES.get(fault.fault, (fault.share, 0.0))
+        for j, joint in enumerate(JOINT_NAMES):
+            if fault.joint in (joint, WHOLE_LEG):
+                rows[_span(fault, times), :, LEG_NAMES.index(fault.leg), j] = state
+    return rows.reshape(len(times), -1)
 
 
 def lost_rows(events: Sequence[Lost], times: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -6,9 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +14,12 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.interface.start_values import parameter_values
-from hexapod_cosim.extensions.identify.log import ATTITUDE, Log, LogError, channel_of
-from hexapod_cosim.extensions.identify.log_plant import LogPlant
+from hexapod_cosim.extensions.identify.log import ATTITUDE, Log, channel_of
 from hexapod_cosim.extensions.identify.numbers import Unknown
+from hexapod_cosim.extensions.identify.plant import LogPlant
 from hexapod_cosim.extensions.identify.start import initial_state
-from hexapod_cosim.extensions.identify.unknowns import CURRENT, DELAYS, ROBOT, changed_robot
-from hexapod_cosim.models import FmuError, Robot
+from hexapod_cosim.extensions.identify.unknowns import CURRENT, DELAYS, changed_robot
+from hexapod_cosim.models import Robot
 from hexapod_cosim.models.kinematics import axis_quaternion, quaternion_product, rotation_matrix
 
 Array = NDArray[np.float64]
@@ -162,7 +160,7 @@ def readings(experiment: Experiment, outputs: Array, values: Mapping[str, float]
     """Returns what the sensors read (rows, columns) of the outputs of `simulated`."""
     found = outputs.copy()
     for k, name in enumerate(experiment.columns):
-        if name.endswith((".angle", ".motor_angle")):
+        if name.endswith(".angle"):
             found[:, k] += values.get(f"zero.{name.rpartition('.')[0]}", 0.0)
         elif name.endswith(".current"):
             found[:, k] /= values.get(CURRENT, 1.0)
@@ -215,31 +213,3 @@ def _start(
         old = np.array([found[name] for name in TURN])
         found |= dict(zip(TURN, quaternion_product(turn, old).tolist(), strict=True))
     return found
-
-
-_own: list[tuple[LogPlant, Robot, Sequence[Experiment]]] = []  # what a worker process opened
-
-
-def open_plant(
-    fmu: Path, robot: Robot, experiments: Sequence[Experiment], parameters: Mapping[str, Any]
-) -> None:
-    """Opens a robot's plant in a worker process. parameters: of all simulations."""
-    _own.append((LogPlant(fmu, parameters), robot, experiments))
-
-
-def simulate_in_worker(
-    values: Mapping[str, float], seconds: float, parameters: Mapping[str, float]
-) -> list[NDArray[np.float64]] | None:
-    """Returns the outputs of each experiment in a worker process; None where the plant refuses.
-
-    Args:
-        values: the numbers, by key.
-        seconds: of each log that are simulated.
-        parameters: further ones of the FMU, by name.
-    """
-    ((plant, robot, experiments),) = _own
-    parts = [first_part(one, seconds) for one in experiments]
-    try:
-        return [simulated(plant, one, robot, ROBOT, values, parameters) for one in parts]
-    except (LogError, FmuError):
-        return None

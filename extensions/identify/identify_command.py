@@ -55,7 +55,10 @@ Friction = Annotated[
 Workers = Annotated[
     int | None,
     typer.Option(
-        "--workers", metavar="N", min=1, help="Processes; default: one for each processor."
+        "--workers",
+        metavar="N",
+        min=1,
+        help="Simulations at a time; default: one for each processor.",
     ),
 ]
 Folder = Annotated[
@@ -76,8 +79,8 @@ def identify(
 ) -> None:
     """Find a robot's masses, servos, contacts and sensors from its own logs."""
     # imported only here because they are slow to import
-    from hexapod_cosim.extensions.identify import identify as fitting  # noqa: PLC0415
-    from hexapod_cosim.extensions.identify import identify_files as files  # noqa: PLC0415
+    from hexapod_cosim.cosim.run.worker_pool import processor_count  # noqa: PLC0415
+    from hexapod_cosim.extensions.identify import identification, results  # noqa: PLC0415
 
     groups = _checked(find or list(FOUND), held_out)
     own = load_robot(robot)
@@ -89,28 +92,28 @@ def identify(
     words += ["--held-out", str(held_out)] if held_out != HELD_OUT else []
     recorded = [read_log(path, torso_com=own.torso.com) for path in logs]
     with results_folder(output or Path("out") / "identify") as folder:
-        found = fitting.identify(
+        found = identification.identify(
             recorded,
             own,
             groups=groups,
             held_out=held_out,
-            workers=workers or fitting.usual_workers(recorded),
+            workers=workers or processor_count(),
             progress=(lambda _text: None) if json else _show_step,
         )
         folder.begin()
         command = shlex.join(words)
-        written = files.write_identified(found, robot, folder.path, command=command)
-    for text in files.warnings(found):
+        written = results.write_identified(found, robot, folder.path, command=command)
+    for text in results.warnings(found):
         warn(text.removesuffix("."))
     if json:
-        show_json({**files.result_table(found), "files": [str(path) for path in written]})
+        show_json({**results.result_table(found), "files": [str(path) for path in written]})
         return
-    shown, zero = files.shown_estimates(found.estimates)
-    show_table(files.ESTIMATES, files.estimate_rows(shown), right=(2, 3, 4))
+    shown, zero = results.estimate_rows(found.estimates)
+    show_table(results.ESTIMATES, shown, right=(2, 3, 4))
     if zero:
-        show_text(f"{zero} biases of sensors may be 0; sensors.toml and the report have them.")
-    show_table(files.ERRORS, files.error_rows(found), right=(2, 3, 4, 5, 6))
-    show_text(files.open_text(found))
+        show_text(f"{zero} biases of sensors may be 0; sensors.toml has them.")
+    show_table(results.ERRORS, results.error_rows(found), right=(2, 3, 4, 5, 6))
+    show_text(results.open_text(found))
     show_files(written)
 
 

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 LEAST_ROWS = 10
 HELD_OUT = 0.25  # share of each log at its end that a fit does not see
 LONGEST_STEP = 0.2  # s    between two rows
-MOST_NAMED = 5  # unknown columns in a warning
+LARGEST = 2.0 * np.pi  # rad  of a command; a larger one is not in rad
 ATTITUDE = ("torso.roll", "torso.pitch", "torso.yaw")
 QUATERNIONS = ("torso.quaternion", "imu.quaternion")  # the first one that a log has counts
 
@@ -56,7 +56,6 @@ class Channel:
 
 CHANNELS = (
     Channel("angle", "Joint angles", "rad", "joints", tuple(joint_names("angle"))),
-    Channel("motor_angle", "Motor angles", "rad", "joints", tuple(joint_names("motor_angle"))),
     Channel("speed", "Joint speeds", "rad/s", "joints", tuple(joint_names("speed"))),
     Channel("torque", "Servo torques", "N.m", "currents", tuple(joint_names("torque"))),
     Channel("current", "Servo currents", "A", "currents", tuple(joint_names("current"))),
@@ -92,8 +91,7 @@ class Log:
 
     recording: Recording  # time, commands and known readings
     where: str
-    unknown: tuple[str, ...] = ()  # columns of the file that no robot records, left out
-    derived: str = ""  # which commands were made from others, as a sentence
+    warnings: tuple[str, ...] = ()  # what a user must know of the columns, as sentences
 
     @property
     def time(self) -> Array:
@@ -129,15 +127,6 @@ class Log:
         keep = [k for k, name in enumerate(self.recording.names) if name not in names]
         kept = tuple(self.recording.names[k] for k in keep)
         return replace(self, recording=Recording(kept, self.recording.data[:, keep]))
-
-    @property
-    def warnings(self) -> list[str]:
-        """What a user must know of the columns, as sentences."""
-        derived = [self.derived] if self.derived else []
-        if not self.unknown:
-            return derived
-        named = ", ".join(self.unknown[:MOST_NAMED]) + ", ..." * (len(self.unknown) > MOST_NAMED)
-        return [f"Columns of {self.where} with unknown names are left out: {named}.", *derived]
 
 
 @cache
@@ -196,20 +185,34 @@ def log_of(recording: Recording, where: str) -> Log:
     wanted = {*input_names(), *(name for one in CHANNELS for name in one.names)}
     wanted |= {*vector_names("torso.velocity"), *vector_names("torso.angular_velocity")}
     valid = known_columns().keys() | wanted
-    unknown = tuple(name for name in recording.names if name not in valid)
+    unknown = [name for name in recording.names if name not in valid]
+    left_out = f"Columns of {where} with unknown names are left out: {', '.join(unknown)}."
     keep = [0, *(k for k, name in enumerate(known.names) if name in wanted)]
     kept = Recording(tuple(known.names[k] for k in keep), known.data[:, keep])
-    log = Log(kept, where, unknown)
+    log = Log(kept, where, (left_out,) if unknown else ())
+    _check_commands(log)
+    return log
+
+
+def _check_commands(log: Log) -> None:
     for name, values in log.commands.items():
-        if not np.isfinite(values).all():
+        known = np.isfinite(values)
+        if not known.all():
             raise LogError(
                 "a command is not a number",
-                got=f"{name} at {log.time[~np.isfinite(values)][0]:g} s",
+                got=f"{name} at {log.time[~known][0]:g} s",
                 expected="a number in each row",
                 fix="drop these rows or repeat the command before",
-                where=where,
+                where=log.where,
             )
-    return log
+        if name in COMMANDS and np.abs(values).max() > LARGEST:
+            raise LogError(
+                "a command beyond a turn",
+                got=f"{name} up to {np.abs(values).max():.3g}",
+                expected="an angle in rad",
+                fix="convert degrees where the log is written",
+                where=log.where,
+            )
 
 
 def _check_times(time: Array, where: str) -> None:
@@ -287,4 +290,4 @@ def with_speed_references(log: Log, robot: Robot) -> Log:
         "each row is right where the servo damps the measured speed alone."
     )
     recording = Recording((*log.recording.names, *missing), data)
-    return replace(log, recording=recording, derived=note)
+    return replace(log, recording=recording, warnings=(*log.warnings, note))

@@ -8,7 +8,7 @@ import csv
 import io
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,37 +21,35 @@ from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.report.page import render
 from hexapod_cosim.cosim.results.folder import RESULTS, results_folder
 from hexapod_cosim.cosim.results.recordings import write_recording
 from hexapod_cosim.cosim.scenario.records import default_formats
 from hexapod_cosim.cosim.scenario.tables import with_overrides
-from hexapod_cosim.extensions.identify.command_screening import wrong_commands, wrong_commands_error
 from hexapod_cosim.extensions.identify.experiment import Experiment
 from hexapod_cosim.extensions.identify.log import (
     Log,
-    LogError,
     read_log,
     with_speed_references,
     without_readings,
 )
-from hexapod_cosim.extensions.identify.log_plant import LogPlant
+from hexapod_cosim.extensions.identify.plant import LogPlant
 from hexapod_cosim.extensions.identify.report import (
     COLUMNS,
     Difference,
-    Section,
     channel_differences,
     channel_figures,
     column_differences,
-    rendered,
 )
 from hexapod_cosim.extensions.identify.screening import BadColumn, left_out, screened
 from hexapod_cosim.extensions.identify.start import initial_state
-from hexapod_cosim.models import FmuError, Robot, load_robot
+from hexapod_cosim.models import Robot, load_robot
 
 REPLAY, REPORT, KIND = "replay.csv", "report.html", "replay"
-CAPTION = (
-    "Errors are simulated minus measured, over all rows; the spread is the root mean square of the "
-    "readings about their mean."
+TEMPLATE = "log.html.jinja"
+LEAD = (
+    "The plant was driven with the commands of the log, from its first row on. Errors are "
+    "simulated minus measured; the spread is the root mean square of the readings about their mean."
 )
 
 
@@ -63,21 +61,12 @@ class Replay:
     simulated: Recording  # time, commands and the outputs of the log's columns
     names: tuple[str, ...]  # the columns that are compared
     columns: tuple[Difference, ...]
-    commands: tuple[BadColumn, ...]  # that the servos cannot have got
-    readings: tuple[BadColumn, ...]  # dead or wrong; none are named where commands are wrong
+    readings: tuple[BadColumn, ...]  # dead or wrong
 
     @property
     def warnings(self) -> list[str]:
         """What a user must know of the columns, as sentences."""
-        return [
-            *self.log.warnings,
-            *(
-                f"The robot cannot have got {one.name}: {one.why}. The simulated robot got it, so "
-                "that the differences are not those of the robot file."
-                for one in self.commands
-            ),
-            *left_out(self.readings, *2 * ("cannot be the robot's",)),
-        ]
+        return [*self.log.warnings, *left_out(self.readings, *2 * ("cannot be the robot's",))]
 
     @property
     def channels(self) -> list[Difference]:
@@ -100,11 +89,8 @@ def replay(
         fmu: its FMU; by default it is exported.
         parameters: further parameters of the FMU, by name.
 
-    Wrong commands are simulated all the same, and named in the result.
-
     Raises HexapodError for a log without readings and where the plant cannot follow the commands.
     """
-    wrong = wrong_commands(log)
     log = with_speed_references(log, robot)
     with TemporaryFolder("replay") as folder:
         path = fmu or export_fmu(robot, folder / "robot.fmu")
@@ -112,12 +98,7 @@ def replay(
             names = plant.known(log.measured)
             if not names:
                 raise without_readings(log)
-            try:
-                found = plant.simulate(log, names, initial_state(log, robot))
-            except (LogError, FmuError) as error:
-                if wrong:
-                    raise wrong_commands_error(log, wrong) from error
-                raise
+            found = plant.simulate(log, names, initial_state(log, robot))
     inputs = log.commands
     data = np.column_stack([log.time, *inputs.values(), found])
     rows = slice(0, len(log.time))
@@ -127,8 +108,7 @@ def replay(
         simulated=Recording(("time", *inputs, *names), data),
         names=tuple(names),
         columns=tuple(column_differences(log, names, found)),
-        commands=tuple(wrong),
-        readings=() if wrong else tuple(screened(whole, found)),
+        readings=tuple(screened(whole, found)),
     )
 
 
@@ -147,10 +127,9 @@ def write_replay(
         "warnings": done.warnings,
     }
     text = io.StringIO()
-    rows = [asdict(one) for one in done.columns]
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer = csv.DictWriter(text, [one.name for one in fields(Difference)], lineterminator="\n")
     writer.writeheader()
-    writer.writerows(rows)
+    writer.writerows(asdict(one) for one in done.columns)
     write_text(folder / REPLAY, text.getvalue())
     (simulated,) = write_recording(
         done.simulated,
@@ -167,31 +146,19 @@ def write_replay(
 def _page(done: Replay, robot: Robot, command: str, simulated_file: str) -> str:
     time = done.log.time
     columns = {name: done.simulated.column(name) for name in done.names}
-    sections = [
-        Section(
-            title="Channel by channel",
-            caption=CAPTION,
-            columns=COLUMNS,
-            rows=[one.as_row() for one in done.channels],
-            left=2,
-        ),
-        Section(
-            title="Measured and simulated",
-            pictures=channel_figures(done.log, {"simulated": columns}),
-        ),
-        Section(
-            title="Column by column",
-            columns=COLUMNS,
-            rows=[one.as_row() for one in done.columns],
-            left=2,
-        ),
-    ]
-    return rendered(
-        sections,
+    return render(
+        TEMPLATE,
+        extension="identify",
         title=f"Replay of {Path(done.log.where).name}",
         headline=f"Robot {robot.name}, {time[-1] - time[0]:.2f} s, {len(time)} rows",
-        lead="The plant FMU was driven with the commands of the log, from its first row on.",
+        lead=LEAD,
         warnings=done.warnings,
+        columns=COLUMNS,
+        tables={
+            "Channel by channel": [one.as_row() for one in done.channels],
+            "Column by column": [one.as_row() for one in done.columns],
+        },
+        pictures=channel_figures(done.log, columns),
         command=command,
         facts={"log": done.log.where, "robot": robot.name, "SHA-256 of the robot": robot.hash},
         source=f"{REPLAY} and {simulated_file}",

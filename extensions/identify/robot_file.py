@@ -16,14 +16,13 @@ import tomlkit
 import tomlkit.items
 
 from hexapod_cosim.cosim.common.files import write_text
-from hexapod_cosim.extensions.identify.identify import Estimate, Identified
+from hexapod_cosim.extensions.identify.identification import Estimate, Identified
 from hexapod_cosim.extensions.identify.unknowns import OF_FILE
 from hexapod_cosim.models import JOINT_NAMES, HexapodError, Robot, load_robot
 from hexapod_cosim.models.robot import robot_path
 
 SECTIONS = ("servo", "contact", "friction")
 BODY_KEYS = ("mass", "com", "inertia")
-SENSORS = "sensors.toml"
 COMMENT = "identified, see [source]"  # beside a new number
 
 
@@ -46,9 +45,8 @@ def robot_text(found: Identified, file: str, folder: Path, logs: Sequence[str]) 
     source["identified"] = f"hexapod identify {names}"
     own = [one for one in found.estimates if one.group in OF_FILE]
     for one in own:
-        source[one.key] = _sentence(one, names, rejected=found.rejected)
-    before = load_robot(file)
-    after = before if found.rejected else found.robot
+        source[one.key] = _sentence(one, names)
+    before, after = load_robot(file), found.robot
     for name in SECTIONS:
         _set_changed(document, name, getattr(before, name), getattr(after, name))
     _set_bodies(document, before, after)
@@ -81,16 +79,14 @@ def _relative(path: Path, folder: Path) -> str:
     return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
 
 
-def _sentence(one: Estimate, logs: str, *, rejected: bool) -> str:
+def _sentence(one: Estimate, logs: str) -> str:
     """Returns where a number comes from."""
     if one.determined:
         interval = f"95 % interval {one.interval} {one.unit}"
         return f"identified from {logs}: {interval}; before {one.before:.6g}"
-    if one.depends:
-        others = ", ".join(one.depends)
-        return f"identified from {logs} as long as {others} have the file's values"
-    why = ", which rejects the model" if rejected else ""
-    return f"not determined by {logs}{why}: as before"
+    if one.value != one.before:
+        return f"not determined by {logs} alone, but only with other numbers as in the file"
+    return f"not determined by {logs}: as before"
 
 
 def _put(table: Any, key: str, value: Any) -> None:
@@ -158,21 +154,6 @@ def _set_links(document: Any, name: str, key: str, values: Mapping[str, Any]) ->
 def _plain(value: Any) -> Any:
     """Returns a number or a list of numbers for TOML."""
     return list(value) if isinstance(value, tuple) else value
-
-
-def sensors_table(found: Identified) -> Mapping[str, Any]:
-    """Returns the numbers of the sensors, by key, with their intervals."""
-    return {
-        one.key: {
-            "value": one.value,
-            "low": one.low,
-            "high": one.high,
-            "unit": one.unit,
-            "determined": one.determined,
-        }
-        for one in found.estimates
-        if one.group in ("sensor", "zero")
-    }
 
 
 def write_robot(found: Identified, file: str, path: Path, logs: Sequence[str]) -> None:

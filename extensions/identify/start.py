@@ -2,8 +2,8 @@
 
 A log should begin with the robot standing still: all rows before the first change of a command are
 averaged then. Unknown quantities are those of a robot at rest on level ground. A measured angle far
-from its command is not where the robot starts, so that a wrong column (in degrees, turned round,
-without numbers) is found by its comparison with the simulation instead of preventing it.
+from its command is not where the robot starts, so that a wrong column (in degrees, turned round) is
+found by its comparison with the simulation instead of preventing it.
 """
 
 from __future__ import annotations
@@ -21,9 +21,6 @@ from hexapod_cosim.models.kinematics import rotation_matrix as rotation
 Array = NDArray[np.float64]
 LONGEST_REST = 0.5  # s    of rest that is averaged
 FARTHEST = 0.5  # rad    of a joint from its command; a servo under load sags by some 0.1 rad
-HIGHEST = 0.1  # m    of the torso above or below the place where the feet carry it
-LEANS = 0.3  # rad    roll or pitch of a robot that stands on level ground
-TURN = 2.0 * np.pi  # rad    a command beyond it is not in rad, and is refused when it is sent
 RATES = {  # quantity of the log: initial value of the FMU
     "torso.velocity": "initial.velocity",
     "torso.angular_velocity": "initial.angular_velocity",
@@ -55,7 +52,7 @@ def initial_state(log: Log, robot: Robot) -> dict[str, float]:
     for k, name in enumerate(joint_names("angle")):
         wanted = mean(commanded[k])
         measured = mean(name) if log.has([name]) else wanted
-        near = abs(measured - wanted) <= FARTHEST or abs(wanted) > TURN
+        near = abs(measured - wanted) <= FARTHEST
         angle.flat[k] = measured if near else wanted
         found[f"initial.{name}"] = float(angle.flat[k])
     for name in joint_names("speed"):
@@ -65,7 +62,7 @@ def initial_state(log: Log, robot: Robot) -> dict[str, float]:
     place = vector_names("torso.position")
     position = _resting(robot, angle, turn)
     if log.has(place):
-        position = _credible([mean(name) for name in place], position, robot)
+        position = [mean(name) for name in place]
     found |= dict(zip(vector_names("initial.position"), position, strict=True))
     for stem, target in RATES.items():
         names = vector_names(stem)
@@ -77,35 +74,20 @@ def initial_state(log: Log, robot: Robot) -> dict[str, float]:
 
 def _mean(values: Array) -> float:
     """Returns the mean of the numbers of a column; NaN where it has none."""
-    known = np.isfinite(values)
-    if known.all():
-        return float(np.mean(values))
-    return float(np.mean(values[known])) if known.any() else float("nan")
-
-
-def _credible(measured: list[float], resting: list[float], robot: Robot) -> list[float]:
-    """Returns a measured position, with that of standing legs for what it lacks. On flat ground a
-    height far from theirs is not where the robot starts.
-    """
-    found = [one if np.isfinite(one) else own for one, own in zip(measured, resting, strict=True)]
-    if robot.terrain.kind == "flat" and abs(found[2] - resting[2]) > HIGHEST:
-        found[2] = resting[2]
-    return found
+    known = values[np.isfinite(values)]
+    return float(np.mean(known)) if len(known) else float("nan")
 
 
 def _attitude(rows: Recording, robot: Robot, angle: Array) -> Array:
     """Returns the mean attitude (4,) in the rows at rest.
 
-    On flat ground it is that of the standing feet where the log lacks it, and roll and pitch are 0
-    where they are more than a standing robot leans.
+    On flat ground it is that of the standing feet where the log lacks it.
     """
-    flat, roll, pitch, yaw = robot.terrain.kind == "flat", 0.0, 0.0, 0.0
+    roll, pitch, yaw = 0.0, 0.0, 0.0
     if set(ATTITUDE) <= set(rows.names):
-        roll, pitch, yaw = (float(np.nan_to_num(_mean(rows.column(name)))) for name in ATTITUDE)
-    elif flat:
+        roll, pitch, yaw = (_mean(rows.column(name)) for name in ATTITUDE)
+    elif robot.terrain.kind == "flat":
         roll, pitch = standing_attitude(robot, angle)
-    if flat and max(abs(roll), abs(pitch)) > LEANS:
-        roll = pitch = 0.0
     turn = axis_quaternion(np.array([0.0, 0.0, 1.0]), yaw)
     turn = quaternion_product(turn, axis_quaternion(np.array([0.0, 1.0, 0.0]), pitch))
     return quaternion_product(turn, axis_quaternion(np.array([1.0, 0.0, 0.0]), roll))

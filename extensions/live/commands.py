@@ -154,7 +154,7 @@ def realtime(
     output: Folder = Path("out/realtime"),
     json: Json = False,
 ) -> None:
-    """Measure doStep of the plant in a walk: quantiles and histogram, touch-downs apart."""
+    """Measure doStep of the plant in a walk: quantiles and histogram."""
     from hexapod_cosim.cosim.run.plan import chosen_gains  # noqa: PLC0415
 
     # imported here because it draws with Matplotlib
@@ -168,14 +168,12 @@ def realtime(
         gains = chosen_gains(live_scenario(plan))
     with progress_bar("doStep", steps * step) as progress:
         times = live.measure(plan, step=step, count=steps, gains=gains, progress=progress)
-    facts, files = live.facts_of(times), live.write(times, output)
+    facts, files = live.facts_of(times, step), live.write(times, step, output)
     if json:
         show_json({**facts, "written": [str(path) for path in files]})
         return
     heading, rows = live.table_of(facts)
-    show_text(
-        f"{facts['steps']} steps of {1e3 * step:g} ms, {facts['touch_downs']} with a touch-down"
-    )
+    show_text(f"{facts['steps']} steps of {1e3 * step:g} ms")
     show_table(heading, rows, right=range(1, len(heading)))
     met = "met" if facts["goal_met"] else "not met"
     show_text(

@@ -9,11 +9,17 @@ from markupsafe import Markup
 
 from hexapod_cosim.cosim.report.page import VIEWER, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json
+from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.extensions.live.settings import FLAT, OWN, Choices
 from hexapod_cosim.models import HexapodError
 from hexapod_cosim.models.ground.table import CATALOGUE
 
 TEMPLATE = "live.html.jinja"
+ABOUTS = {
+    "kinematic": "Plays the planned joint angles; feels neither ground nor attitude.",
+    "paper": "Moves feet back to their plan, by joint angles, foot forces and attitude.",
+    "compliant": "Plans the forces of the feet and commands torques: softer landings, less slip.",
+}
 
 
 def render_page(
@@ -48,10 +54,12 @@ def render_page(
 
 def _describe(choices: Choices) -> dict[str, Any]:
     """Returns the choices of the page (viewer/messages.ts)."""
-    about = {OWN: "of the scenario", FLAT: "a horizontal plane"}
+    own = scenario_robot(choices.scenario).terrain.name.replace("_", " ")
+    about = {OWN: f"{own}, as in this scenario", FLAT: "a horizontal plane"}
     about |= {name: entry.about for name, entry in CATALOGUE.items()}
     return {
         "controls": list(choices.controls),
+        "abouts": ABOUTS,
         "refused": choices.refused,
         "gaits": list(choices.gaits),
         "grounds": [{"name": name, "about": about[name]} for name in choices.grounds],

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter_ns, thread_time_ns
 from typing import Any
@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Gains
 from hexapod_cosim.controller.figure_style import PALETTE, SETTINGS, WIDTH
-from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.report.figures import Figures, figure_files, write_figures
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.extensions.live.recording import NO_FORCE
@@ -34,26 +33,9 @@ WORST = 300.0  # us    goal of the slowest step
 EDGES = np.geomspace(1.0, 1e5, 101)  # us    of the bins
 FEWEST = 1000  # steps of a measurement
 FIGURE = "realtime"
+CLOCKS = ("thread time", "wall time")
 Micro = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class StepTimes:
-    """Times of successive steps of `step` [s] (n,) [us], and whether a foot touched down."""
-
-    step: float
-    thread: Micro
-    wall: Micro
-    touched: NDArray[np.bool_]
-
-    def kinds(self) -> dict[str, Micro]:
-        """Returns the times by clock and kind of steps, those without any left out."""
-        found: dict[str, Micro] = {}
-        for clock, values in (("thread", self.thread), ("wall", self.wall)):
-            found[f"{clock} time, all steps"] = values
-            if self.touched.any():
-                found[f"{clock} time, with a touch-down"] = values[self.touched]
-        return found
+Times = Mapping[str, Micro]  # by clock, CLOCKS, of successive steps (n,) [us]
 
 
 def measure(
@@ -63,7 +45,7 @@ def measure(
     count: int,
     gains: Gains | None = None,
     progress: Callable[[float], None] | None = None,
-) -> StepTimes:
+) -> Times:
     """Walks `count` macro-steps of `step` [s] under the scenario's first command.
 
     gains: designed for this step; None for a control without any. Raises HexapodError, also when
@@ -85,10 +67,9 @@ def _measure(
     command: BodyCommand,
     count: int,
     progress: Callable[[float], None] | None,
-) -> StepTimes:
+) -> Times:
     """Steps a robot with a clock around its plant; collections of garbage wait."""
-    places = [robot.signals.names.index(name) for name in foot_names("landings")]
-    times, touched = np.zeros((2, count)), np.zeros(count, dtype=np.bool_)
+    times = np.zeros((2, count))
     advance, number = robot.advance, 0
 
     def timed(t: float, h: float) -> None:
@@ -101,26 +82,24 @@ def _measure(
     gc.disable()
     try:
         for number in range(count):
-            landings = robot.signals.values[places].copy()
             robot.step(command, NO_FORCE)
-            touched[number] = np.any(robot.signals.values[places] != landings)
             if robot.fault:
                 raise HexapodError("the robot did not walk to the end", got=robot.fault)
             if progress is not None and number % 1000 == 0:
                 progress(number * robot.h)
     finally:
         gc.enable()
-    return StepTimes(robot.h, times[0] / 1e3, times[1] / 1e3, touched)
+    return dict(zip(CLOCKS, times / 1e3, strict=True))
 
 
-def facts_of(times: StepTimes) -> dict[str, Any]:
+def facts_of(times: Times, step: float) -> dict[str, Any]:
     """Returns counts, quantiles [us] and whether the goals are met, for people and for JSON."""
+    thread = times[CLOCKS[0]]
     return {
-        "step": times.step,
-        "steps": len(times.thread),
-        "touch_downs": int(times.touched.sum()),
-        "goal_met": goal_met(times.thread),
-        "times": {kind: _quantiles(values) for kind, values in times.kinds().items()},
+        "step": step,
+        "steps": len(thread),
+        "goal_met": goal_met(thread),
+        "times": {clock: _quantiles(values) for clock, values in times.items()},
     }
 
 
@@ -148,27 +127,22 @@ def table_of(facts: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
     return ["us", *next(iter(facts["times"].values()))], rows
 
 
-def write(times: StepTimes, folder: Path) -> list[Path]:
+def write(times: Times, step: float, folder: Path) -> list[Path]:
     """Writes the histogram as PNG and SVG; returns the files."""
     folder.mkdir(parents=True, exist_ok=True)
     with matplotlib.rc_context(SETTINGS):
-        images = {f"{FIGURE}.{kind}": image for kind, image in figure_files(draw(times))}
+        images = {f"{FIGURE}.{kind}": image for kind, image in figure_files(draw(times, step))}
     return write_figures(Figures(images, {}), folder)
 
 
-def draw(times: StepTimes) -> Figure:
+def draw(times: Times, step: float) -> Figure:
     """Draws the histograms of both clocks beside each other, with the goals."""
     figure = Figure(figsize=(WIDTH, 2.6))
     axes = figure.subplots(1, 2, sharex=True, sharey=True)
-    for clock, axis in zip(("thread", "wall"), axes, strict=True):
-        shown = {kind: values for kind, values in times.kinds().items() if kind.startswith(clock)}
-        for (kind, values), colour in zip(shown.items(), PALETTE, strict=False):
-            label = kind.partition(", ")[2]
-            bars: dict[str, Any] = {"bins": EDGES, "color": colour}
-            axis.hist(values, histtype="stepfilled", alpha=0.35, label=label, **bars)
+    for (clock, values), axis, colour in zip(times.items(), axes, PALETTE, strict=False):
+        axis.hist(values, bins=EDGES, color=colour, histtype="stepfilled", alpha=0.5)
         for goal in (GOAL, WORST):
             axis.axvline(goal, color="0.4", linestyle=":", linewidth=1.0)
-        axis.set(title=f"{clock} time", xlabel=f"doStep({1e3 * times.step:g} ms) [µs]")
+        axis.set(title=clock, xlabel=f"doStep({1e3 * step:g} ms) [µs]")
     axes[0].set(ylabel="steps", xscale="log", yscale="log", xlim=(2.0, 5e4))
-    axes[0].legend(loc="upper right")
     return figure

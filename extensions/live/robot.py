@@ -22,12 +22,15 @@ from __future__ import annotations
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from hexapod_cosim.controller import BodyCommand, ControllerError, Gains, Gait, JointCommand
 from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import make_controller
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw, law_of_ours
 from hexapod_cosim.cosim.export.plant import export_controller
 from hexapod_cosim.cosim.interface.controller import controller_parameters
+from hexapod_cosim.cosim.interface.names import JOINTS, LEGS
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_block import StepError
 from hexapod_cosim.cosim.master.loop import JointController, macro_step
@@ -37,6 +40,7 @@ from hexapod_cosim.cosim.results.window import robot_weight
 from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
 from hexapod_cosim.cosim.run.plant import PlantFmus, apply_settings, initialise_plant
 from hexapod_cosim.cosim.scenario.controls import control_of
+from hexapod_cosim.cosim.scenario.schedule import healthy_servos
 from hexapod_cosim.extensions.live.messages import Change
 from hexapod_cosim.extensions.live.recording import Force
 from hexapod_cosim.extensions.live.settings import (
@@ -48,7 +52,7 @@ from hexapod_cosim.extensions.live.settings import (
     gait_of,
     plan_change,
 )
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models import LEG_NAMES, HexapodError
 
 HORIZON = 1e6  # s    stop time of the FMUs
 STATE = "initial."  # prefix of the plant's parameters for the state at the start
@@ -151,8 +155,20 @@ class LiveRobot(Closing):
         self.weight = robot_weight(self.parameters)
         self.signals = Signals(self._plant, errors=errors_of(scenario, self.plan.schedule))
         self.signals.read()
+        self._servos = healthy_servos()
         self._last = JointCommand(angle_ref=self.signals.measurement.angle.copy())
         self._start_controller()
+
+    def toggle_leg(self, leg: int) -> str:
+        """Makes all servos of a leg limp, or healthy again; returns which, in a sentence."""
+        strength = self._servos[: LEGS * JOINTS].reshape(LEGS, JOINTS)
+        strength[leg] = 1.0 - strength[leg]
+        return f"Leg {LEG_NAMES[leg]} {'works again' if strength[leg, 0] else 'is limp'}."
+
+    @property
+    def limp(self) -> tuple[int, ...]:
+        """The legs that are limp."""
+        return tuple(np.flatnonzero(self._servos[: LEGS * JOINTS : JOINTS] == 0.0).tolist())
 
     def change(self, change: Change) -> None:
         """Begins a change of the settings. Raises HexapodError, and then leaves all as it was."""
@@ -224,7 +240,6 @@ class LiveRobot(Closing):
         if passed == round(change.begin / self.h):
             self._tune(self.plan, "gait.")
             self._gait = pending.gait
-        if passed == round(change.settled / self.h):
             self.settings = replace(self.settings, gait=pending.gait.name)
         if passed == round(change.end / self.h):
             self.limits, self._pending = find_limits(self.plan.controller.robot, self._gait), None
@@ -277,6 +292,7 @@ class LiveRobot(Closing):
         self._follow_change()
         self.signals.push[:3] = force
         try:
+            self.signals.set_servos(self._servos)
             self._advance(command)
             self.count += 1
         except HexapodError as error:

@@ -63,11 +63,6 @@ class Limits:
         height = drive.height * (self.up if drive.height > 0.0 else self.down)
         return BodyCommand(vx, vy, yaw_rate, height)
 
-    def share(self, command: BodyCommand) -> float:
-        """Returns the share of the reach that the velocities of a command take; 1 is all of it."""
-        parts = (command.vx / self.vx, command.vy / self.vy, command.yaw_rate / self.yaw_rate)
-        return sum(abs(part) for part in parts)
-
     def least(self, other: Limits) -> Limits:
         """Returns the smaller ones of two limits."""
         mine, theirs = astuple(self), astuple(other)
@@ -181,14 +176,12 @@ class GaitChange:
 
     limits: Limits  # of commands until `end`
     begin: float  # s    the robot is slow, and the controller gets the next gait
-    settled: float  # s    no leg steps in the gait before
     end: float  # s    each leg has made its first step in the next gait
 
 
 def plan_change(robot: Robot, before: Gait, after: Gait) -> GaitChange:
     """Returns the plan of a change between two gaits of a robot."""
     limits = find_limits(robot, before).least(find_limits(robot, after)).times(SHARE)
-    swing = before.period * (1.0 - before.duty)
+    swing = before.period * (1.0 - before.duty)  # legs in the air finish their steps first
     begin = before.period  # the ramp to a slower command takes a gait period (C1)
-    settled = begin + swing
-    return GaitChange(limits, begin, settled, settled + swing + after.period)
+    return GaitChange(limits, begin, begin + 2.0 * swing + after.period)

@@ -52,18 +52,11 @@ def describe_world(robot: Robot, parameters: Mapping[str, float], step: float) -
 
 def frame_of(robot: LiveRobot, pacer: Pacer) -> dict[str, Any]:
     """Returns pose, motion, forces and lateness as of now (viewer/messages.ts)."""
-    late = pacer.lateness
     return {key: _rounded(_values(robot, names)) for key, names in SHOWN.items()} | {
         "time": round(robot.time, 6),
         "force": _rounded(_values(robot, FORCES) / robot.weight),
         "push": _rounded(robot.signals.push[:3]),
-        "late": {
-            "factor": round(pacer.factor, 4),
-            "steps": late.steps,
-            "misses": late.misses,
-            "worst": round(late.worst, 5),
-            "skipped": round(late.skipped, 3),
-        },
+        "late": {"factor": round(pacer.factor, 4), "skipped": round(pacer.skipped, 3)},
     }
 
 

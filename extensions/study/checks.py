@@ -14,7 +14,6 @@ from hexapod_cosim.cosim.scenario.controls import LAW
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.tables import with_values
-from hexapod_cosim.cosim.scenario.values import QUANTITY
 from hexapod_cosim.extensions.study.factors import PARAMETERS, samples
 from hexapod_cosim.extensions.study.records import (
     DRAWN,
@@ -33,7 +32,7 @@ from hexapod_cosim.extensions.study.records import (
 from hexapod_cosim.extensions.study.rules import is_number, require
 from hexapod_cosim.extensions.study.runs import count_runs
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
-from hexapod_cosim.models.schema import Number, specs
+from hexapod_cosim.models.schema import QUANTITY, Number, specs
 
 # settings that a study gives its runs itself, and what to write instead
 ELSEWHERE = {

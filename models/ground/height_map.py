@@ -1,12 +1,11 @@
-"""Makes surfaces of height maps from files: 16-bit PNG, NumPy arrays and ESRI ASCII grids.
+"""Makes surfaces of height maps from files: grey PNG and NumPy arrays.
 
-The first row of a picture and of an ASCII grid is the northern one, at the largest y; row 0 of an
-array is at the smallest y, as in `Surface`. The middle of the map comes to (x, y).
+The first row of a picture is the northern one, at the largest y; row 0 of an array is at the
+smallest y, as in `Surface`. The middle of the map comes to (x, y).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from io import BytesIO
@@ -30,17 +29,17 @@ from hexapod_cosim.models.ground.parameters import (
 )
 from hexapod_cosim.models.ground.rough import off_platform
 from hexapod_cosim.models.ground.surface import Surface, check_heights
+from hexapod_cosim.models.ground.valleys import smoothed
 from hexapod_cosim.models.schema import Number
 
 NO_MAP = "not a height map"
-ASC_KEYS = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize")
+GREY = ("L", "I;16", "I;16B", "I")  # modes of pictures, 8 or 16 bits per pixel
 
 
 class HeightFile(NamedTuple):
-    """The heights of a file, from the southern row on, and its scales."""
+    """The heights of a file, from the southern row on, and their scale."""
 
     units: Array  # (rows, columns) in units of `scale`
-    cell: float  # m    spacing; 0: the file has none
     scale: float  # m    of a unit; 0: the file has none
     place: Callable[[int, int], str]  # where (row, column) is in the file, for messages
 
@@ -64,18 +63,18 @@ def _read_png(path: Path) -> HeightFile:
         raise _not_grey(path, "a file of another kind, or one that is cut") from None
     except Exception as error:  # Pillow's readers raise errors of many kinds
         raise _not_grey(path, f"a damaged file ({error})") from error
-    if mode not in ("I;16", "I;16B", "I"):
+    if mode not in GREY:
         raise _not_grey(path, f"pixels of the kind {mode}")
 
     def place(row: int, column: int) -> str:
         return f"in row {len(levels) - row} from above, column {column + 1}"
 
-    return HeightFile(levels, 0.0, 0.0, place)
+    return HeightFile(levels, 0.0, place)
 
 
 def _not_grey(path: Path, got: str) -> RobotError:
-    fix = "save the map again as 16-bit greyscale, or give heights in metres as a .npy array"
-    return _refused(path, NO_MAP, got, "PNG with 16 bits of grey per pixel", fix)
+    fix = "save the map again in grey, best with 16 bits, or give heights in metres as a .npy array"
+    return _refused(path, NO_MAP, got, "PNG with 8 or 16 bits of grey per pixel", fix)
 
 
 def _read_npy(path: Path) -> HeightFile:
@@ -89,9 +88,8 @@ def _read_npy(path: Path) -> HeightFile:
         shape = f"{getattr(array, 'ndim', 0)} axes of {getattr(array, 'dtype', type(array))}"
         raise _wrong_array(path, shape)
     scale = 1.0 if array.dtype.kind == "f" else 0.0
-    return HeightFile(
-        array.astype(np.float64), 0.0, scale, lambda row, column: f"at [{row}, {column}]"
-    )
+    place = "at [{}, {}]".format
+    return HeightFile(array.astype(np.float64), scale, place)
 
 
 def _wrong_array(path: Path, got: str) -> RobotError:
@@ -99,55 +97,9 @@ def _wrong_array(path: Path, got: str) -> RobotError:
     return _refused(path, NO_MAP, got, expected, "write it with numpy.save")
 
 
-def _read_asc(path: Path) -> HeightFile:
-    """Returns the heights of an ESRI ASCII grid in metres, and its cellsize [m]."""
-    try:
-        text = read_bytes(path, MAP_SIZE).decode("ascii")
-    except UnicodeDecodeError as error:
-        raise _wrong_grid(path, "bytes that are no text") from error
-    words = text.split()
-    header, begin = dict[str, float](), 0
-    while begin + 1 < len(words) and words[begin][0].isalpha() and _is_number(words[begin + 1]):
-        header[words[begin].lower()] = float(words[begin + 1])
-        begin += 2
-    unknown = sorted(set(header) - {*ASC_KEYS, "nodata_value"})
-    if unknown or not {"ncols", "nrows"} <= set(header):
-        raise _wrong_grid(path, f"the header {', '.join(header) or 'without keys'}")
-    if not all(math.isfinite(header.get(key, 0.0)) for key in ASC_KEYS):
-        raise _wrong_grid(path, "a header with numbers that are not finite")
-    rows, columns = round(header["nrows"]), round(header["ncols"])
-    try:
-        values = np.array(words[begin:], dtype=np.float64)
-    except ValueError as error:
-        raise _wrong_grid(path, str(error)) from error
-    if values.size != rows * columns or rows < 1:
-        raise _wrong_grid(path, f"{values.size} heights for {rows} rows of {columns}")
-    values = np.where(values == header.get("nodata_value", -9999.0), math.nan, values)
-
-    def place(row: int, column: int) -> str:
-        return f"in row {rows - row} of the grid, number {column + 1}"
-
-    return HeightFile(values.reshape(rows, columns)[::-1], header.get("cellsize", 0.0), 1.0, place)
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
-
-
-def _wrong_grid(path: Path, got: str) -> RobotError:
-    expected = "ncols, nrows, cellsize and then nrows x ncols heights in metres"
-    fix = "export the map again from the tool that made it"
-    return _refused(path, "not an ESRI ASCII grid", got, expected, fix)
-
-
 READERS: dict[str, Callable[[Path], HeightFile]] = {
     ".png": _read_png,
     ".npy": _read_npy,
-    ".asc": _read_asc,
 }
 
 
@@ -158,12 +110,13 @@ MAPS: Entries = {}
     MAPS,
     "Height map from a file",
     {
-        "file": text(None, "path of a 16-bit PNG, a .npy array or an ESRI .asc grid"),
-        "horizontal_scale": length(0.0, "per pixel or cell; 0: cellsize of the file", zero=True),
+        "file": text(None, "path of a grey PNG or a .npy array"),
+        "horizontal_scale": length(None, "per pixel or cell"),
         "vertical_scale": length(0.0, "per unit of height; 0: the file is in metres", zero=True),
         "slope_threshold": ratio(
             0.0, "steeper maps become blocks; 0: always smooth", least=0.0, most=1e3
         ),
+        "smooth": length(0.0, "least radius of valleys, by averages; 0: as it is", zero=True),
         "platform_size": replace(PLATFORM, default=0.0),
         "x": Parameter(spec=Number("m"), default=0.0, about="middle of the map"),
         "y": Parameter(spec=Number("m"), default=0.0, about="middle of the map"),
@@ -172,9 +125,9 @@ MAPS: Entries = {}
 def heightfield(values: SimpleNamespace) -> Surface:
     """Returns the surface of a height map's file.
 
-    values: file, horizontal_scale [m] (0: that of the file), vertical_scale [m per unit] (0: that
-    of the file), slope_threshold (0: always smooth), platform_size [m], x, y [m]. Where the map is
-    somewhere steeper than the threshold, its values become blocks. Raises RobotError.
+    values: file, horizontal_scale [m], vertical_scale [m per unit] (0: that of the file),
+    slope_threshold (0: always smooth), smooth [m] (0: no), platform_size [m], x, y [m]. Where the
+    map is somewhere steeper than the threshold, its values become blocks. Raises RobotError.
     """
     path = Path(values.file)
     reader = READERS.get(path.suffix.lower())
@@ -188,53 +141,29 @@ def heightfield(values: SimpleNamespace) -> Surface:
     except OSError as error:
         what = "cannot read the height map"
         got = error.strerror or str(error)
-        fix = "give the path of a .png, .npy or .asc file, relative to the TOML file"
+        fix = "give the path of a .png or .npy file, relative to the TOML file"
         raise RobotError(what, got=got, fix=fix, where=str(path)) from error
-    cell = _chosen(
-        "horizontal_scale", "m per pixel or cell", values.horizontal_scale, read.cell, path
-    )
-    scale = _chosen(
-        "vertical_scale", "m per unit of height", values.vertical_scale, read.scale, path
-    )
-    height = read.units.astype(np.float64) * scale
-    _check_size(path, height)
+    scale = values.vertical_scale or read.scale
+    if scale == 0.0:
+        what = "a height map without vertical_scale"
+        expected = "a scale in m per unit of height"
+        fix = "add `vertical_scale = ...` to [terrain]"
+        raise RobotError(what, got="none in the file", expected=expected, fix=fix, where=str(path))
+    height = read.units * scale
     check_heights(height, str(path), read.place)
     try:
-        return _surface(path, height, cell, values)
+        surface = _surface(path, height, values)
+        return smoothed(surface, values.smooth) if values.smooth > 0.0 else surface
     except RobotError as error:
         error.where = str(path)  # the surface knows the map's name alone
         raise
 
 
-def _chosen(key: str, unit: str, given: float, own: float, path: Path) -> float:
-    """Returns the given scale, or else the file's own. Raises RobotError without any."""
-    scale = given or own
-    if scale == 0.0:
-        what = f"a height map without {key}"
-        expected = f"a scale in {unit}"
-        fix = f"add `{key} = ...` to [terrain]"
-        raise RobotError(what, got="none in the file", expected=expected, fix=fix, where=str(path))
-    if not (math.isfinite(scale) and scale > 0.0):
-        what = f"{key} of the height map"
-        expected = f"a positive scale in {unit}"
-        fix = f"correct `{key}` in [terrain], or the file's cellsize"
-        raise RobotError(what, got=scale, expected=expected, fix=fix, where=str(path))
-    return scale
-
-
-def _check_size(path: Path, height: Array) -> None:
-    """Raises RobotError for a map without two rows and columns."""
-    if height.ndim != 2 or min(height.shape) < 2:
-        what = "the height map is too small"
-        got = " x ".join(map(str, height.shape))
-        expected = "at least 2 rows and 2 columns"
-        fix = "give a map with more rows and columns"
-        raise RobotError(what, got=got, expected=expected, fix=fix, where=str(path))
-
-
-def _surface(path: Path, height: Array, cell: float, values: SimpleNamespace) -> Surface:
+def _surface(path: Path, height: Array, values: SimpleNamespace) -> Surface:
     """Returns the surface of heights [m], smooth or of blocks, with its middle at (x, y)."""
-    steepest = max(float(np.max(np.abs(np.diff(height, axis=axis)))) for axis in (0, 1)) / cell
+    cell = values.horizontal_scale
+    rises = [np.abs(np.diff(height, axis=axis)) for axis in (0, 1)]
+    steepest = max(float(np.max(rise, initial=0.0)) for rise in rises) / cell
     blocks = 0.0 < values.slope_threshold < steepest
     rows, columns = height.shape
     shift = 0.0 if not blocks else 0.5

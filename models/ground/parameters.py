@@ -89,7 +89,7 @@ def text(default: str | None, about: str) -> Parameter:
 
 Parameters = Mapping[str, Parameter]
 
-SIZE = length(4.0, "edge of the map, the tile; the robot starts in its middle", least=0.1)
+SIZE = length(4.0, "edge of the map; the robot starts in its middle", least=0.1)
 HORIZONTAL = length(0.05, "spacing of heights, or edge of a block", least=1e-3, zero=True)
 VERTICAL = length(0.0025, "random heights are multiples of it", least=1e-6, zero=True)
 PLATFORM = length(0.8, "edge of the flat square around the robot's start", zero=True)
@@ -120,22 +120,20 @@ class Entry:
     about: str
     make: Callable[[SimpleNamespace], Surface]
     parameters: Parameters
-    tile: bool  # whether tiles of a curriculum may have it
-    listed: bool  # whether it is a surface of its own
 
 
 Entries = dict[str, Entry]
 
 
 def entry(
-    table: Entries, about: str, parameters: Parameters, *, tile: bool = True, listed: bool = True
+    table: Entries, about: str, parameters: Parameters
 ) -> Callable[[Callable[[SimpleNamespace], Surface]], Callable[[SimpleNamespace], Surface]]:
     """Returns a decorator that puts a surface into a table, by the name of its function."""
 
     def register(
         make: Callable[[SimpleNamespace], Surface],
     ) -> Callable[[SimpleNamespace], Surface]:
-        table[make.__name__] = Entry(about, make, parameters, tile, listed)
+        table[make.__name__] = Entry(about, make, parameters)
         return make
 
     return register

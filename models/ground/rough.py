@@ -78,12 +78,10 @@ def off_platform(x: Array, y: Array, cell: float, platform: float) -> Array:
     SMOOTH,
     "Inclined plane as a grid",
     {
-        "size": SIZE,
-        "horizontal_scale": HORIZONTAL,
+        **PLANE,
         "slope_x": ratio(0.0, "rise along +x over run", least=-2.0, most=2.0),
         "slope_y": ratio(0.0, "rise along +y over run", least=-2.0, most=2.0),
     },
-    tile=False,
 )
 def plane(values: SimpleNamespace) -> Surface:
     """Returns the plane z = slope_x x + slope_y y, exact to rounding."""
@@ -91,9 +89,7 @@ def plane(values: SimpleNamespace) -> Surface:
     return _surface("plane", x, y, cell, values.slope_x * x + values.slope_y * y)
 
 
-@entry(
-    SMOOTH, "Level soil", {"size": SIZE, "horizontal_scale": HORIZONTAL, "soil": SOIL}, tile=False
-)
+@entry(SMOOTH, "Level soil", {**PLANE, "soil": SOIL})
 def sand(values: SimpleNamespace) -> Surface:
     """Returns a plane whose material is given by the parameter `soil` (table.py)."""
     x, y, cell = _nodes(values.size, values.size, values.horizontal_scale)
@@ -106,22 +102,6 @@ def pyramid_slope(values: SimpleNamespace) -> Surface:
     x, y, cell = _nodes(values.size, values.size, values.horizontal_scale)
     outside = np.maximum(np.abs(x), np.abs(y)) - 0.5 * values.platform_size - FLAT_CELLS * cell
     return _surface("pyramid_slope", x, y, cell, -values.slope * np.maximum(outside, 0.0))
-
-
-@entry(SMOOTH, "Slopes up to all sides", {**TILE, "slope": SLOPE}, listed=False)
-def inverted_pyramid_slope(values: SimpleNamespace) -> Surface:
-    """Returns a hollow with a flat bottom at the start, whose sides have the pyramid's slope."""
-    pyramid = pyramid_slope(values)
-    return replace(pyramid, height=-pyramid.height, name="inverted_pyramid_slope")
-
-
-@entry(
-    SMOOTH, "Slopes down to all sides with roughness", {**ROUGHNESS, "slope": SLOPE}, listed=False
-)
-def rough_slope(values: SimpleNamespace) -> Surface:
-    """Returns the sum of a pyramid's slopes and random heights."""
-    pyramid, rough = pyramid_slope(values), random_uniform(values)
-    return replace(pyramid, height=pyramid.height + rough.height, name="rough_slope")
 
 
 @entry(

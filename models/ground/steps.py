@@ -276,7 +276,6 @@ def rubble(values: SimpleNamespace) -> Surface:
         "vertical_scale": VERTICAL,
         "seed": SEED,
     },
-    tile=False,
 )
 def course(values: SimpleNamespace) -> Surface:
     """Returns a course of 5 m along +x: rubble, kerbs, stones with gaps, stairs up and down.

@@ -14,7 +14,6 @@ from types import SimpleNamespace
 from typing import Any
 
 from hexapod_cosim.models.errors import RobotError, refuse_path, unknown_name
-from hexapod_cosim.models.ground.curriculum import CURRICULUM
 from hexapod_cosim.models.ground.height_map import MAPS
 from hexapod_cosim.models.ground.parameters import Entries, Entry, read_values, with_defaults
 from hexapod_cosim.models.ground.patches import (
@@ -40,9 +39,7 @@ from hexapod_cosim.models.schema import (
 MOST_NODES = 1 << 24  # of a generated surface
 KEPT = 32  # surfaces in the cache
 # in the order of lists
-CATALOGUE: Entries = {
-    name: one for name, one in {**BLOCKS, **SMOOTH, **CURRICULUM, **MAPS}.items() if one.listed
-}
+CATALOGUE: Entries = {**BLOCKS, **SMOOTH, **MAPS}
 
 
 def entry_of(name: str, *, where: str | None = None) -> Entry:

@@ -54,6 +54,7 @@ class Power:
 
     supply: float  # voltage over that of the servo
     limit: Array | float  # this times the share of the duty limit that heat leaves
+    strength: Array | float = 1.0  # share of its limits that a fault leaves
 
 
 FULL = Power(1.0, 1.0)
@@ -65,11 +66,12 @@ def motor_torque(servo: Servo, speed: Array, wanted: Array, power: Power = FULL)
     wanted: kp (q_ref - q) + kd (qd_ref - qd) + tau_ff [N m]. In position mode its voltage is
     R/k_t wanted V/V_0 with the supply's V, as in servos that turn the position error into a duty;
     torque mode adds the back-EMF, as a current controller does. The voltage is clipped to duty_max
-    times the supply.
+    times the supply; the torques at these limits are multiplied by the strength.
     """
     stall, brake = stall_torque(servo) * power.limit, back_emf_damping(servo) * speed
     driven = wanted + brake if servo.mode == "torque" else wanted * power.supply
-    return np.asarray(np.clip(driven, -stall, stall) - brake)
+    low, high = power.strength * (-stall - brake), power.strength * (stall - brake)
+    return np.asarray(np.clip(driven - brake, low, high))
 
 
 def motor_current(servo: Servo, torque: Array) -> Array:
@@ -185,7 +187,9 @@ def remaining_rating(servo: Servo, winding: Array) -> Array:
     return np.asarray(np.clip((servo.temperature_max - winding) / span, 0.0, 1.0))
 
 
-def supply_power(servo: Servo, speed: Array, wanted: Array, winding: Array) -> Power:
+def supply_power(
+    servo: Servo, speed: Array, wanted: Array, winding: Array, strength: Array | float = 1.0
+) -> Power:
     """Returns what motors get whose speeds [rad/s], wanted torques [N m] as of `motor_torque` and
     windings' temperatures [K] have one shape (eq. 53).
 
@@ -194,14 +198,15 @@ def supply_power(servo: Servo, speed: Array, wanted: Array, winding: Array) -> P
     """
     share = duty_share(servo, winding)
     if servo.supply_resistance == 0.0 or servo.mode == "kinematic":
-        return Power(1.0, share)
+        return Power(1.0, share, strength)
     brake = back_emf_damping(servo) * speed if servo.mode == "torque" else 0.0
-    limit = servo.duty_max * share
-    duty = np.clip((wanted + brake) * servo.duty_max / stall_torque(servo), -limit, limit)
+    per_torque, limit = servo.duty_max / stall_torque(servo), strength * servo.duty_max * share
+    idle = (1.0 - strength) * per_torque * back_emf_damping(servo) * speed  # without a current
+    duty = np.clip((wanted + brake) * per_torque, idle - limit, idle + limit)
     ratio = servo.supply_resistance / servo.resistance
     back = servo.torque_constant * float(np.sum(duty * speed)) / servo.voltage
     supply = min(1.0, (1.0 + ratio * back) / (1.0 + ratio * float(np.sum(duty**2))))
-    return Power(supply, supply * share)
+    return Power(supply, supply * share, strength)
 
 
 def held_commands(servo: Servo, time: Array, angle: Array) -> Array:

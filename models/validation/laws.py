@@ -4,6 +4,8 @@ servos.
 
 from __future__ import annotations
 
+import math
+
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.friction import STATIC_LAWS, Friction
 from hexapod_cosim.models.ground.surface import Surface
@@ -55,8 +57,9 @@ def check_contact_surface(robot: Robot, surface: Surface, where: str) -> None:
         got=f"a radius of curvature of {1e3 * valley.radius:.4g} mm at x = {valley.x:.4g} m, "
         f"y = {valley.y:.4g} m",
         expected=f"at least {1e3 * limit:.4g} mm, {VALLEY_MARGIN:g} times {name}",
-        fix="enlarge terrain.horizontal_scale, reduce difficulty or heights, choose blocks (a "
-        f"heightfield with slope_threshold), or reduce {name}",
+        fix=f"set terrain.smooth = {math.ceil(1e5 * limit) / 1e5:g} of a heightfield, or its "
+        "slope_threshold for blocks; else enlarge terrain.horizontal_scale, reduce difficulty or "
+        f"heights, or {name}",
         where=where,
     )
 

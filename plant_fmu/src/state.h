@@ -69,6 +69,12 @@ typedef union hxPlantMotion {
   };
 } hxPlantMotion;
 
+/* Stops of a joint (eq. 39). Those of a locked joint are at the angle where it was locked. */
+typedef struct hxStops {
+  double middle[HX_SLOTS], half_range[HX_SLOTS]; /* rad */
+  double stiffness[HX_SLOTS], damping[HX_SLOTS]; /* N m/rad, N m s/rad */
+} hxStops;
+
 /* Constants of a joint and the link it moves (docs/equations.md: s, s^P, a, b); i = parent, j =
  * child. In the model and in the motion the child's axes are the joint's: x = a, y = b, z = s, so
  * that its rotation matrix contains the vectors that the constraint needs. */
@@ -80,7 +86,7 @@ typedef struct hxJointModel {
   double point_j[3][HX_SLOTS]; /* child's centre of mass to the joint's point, child's axes */
   double zero[4][HX_SLOTS];    /* rotation from parent's to child's axes at angle 0 */
   double frame[4][HX_SLOTS];   /* rotation from link axes of hexapod.h to child's axes */
-  double middle[HX_SLOTS], half_range[HX_SLOTS]; /* rad  between the stops */
+  hxStops stop, own_stop;      /* those in force, and those of the robot, without locks */
 } hxJointModel;
 
 /* Constants of the heat of winding and housing (eq. 52). */
@@ -103,7 +109,7 @@ typedef struct hxModel {
   int contact_law, friction_law, terrain_kind, servo_mode, method, projection;
   int velocity_terms;               /* 1: the tanh law has static friction or a viscous part */
   int spin_friction, roll_friction; /* 1: the feet resist spin, rolling */
-  int stops;                        /* 1: the joints have stops */
+  int stops;                        /* bits: 1: the joints have stops, 2: some are locked */
   int servo_drive;                  /* hxServoDrive */
   int measured_friction;            /* 1: the gears have more than Coulomb friction */
   int stribeck;                     /* 1: it has Stribeck terms */
@@ -123,7 +129,7 @@ typedef struct hxModel {
   double static_rise, per_stribeck;                    /* eq. 18: mu_s - mu, 1/v_s */
   double viscous;                                      /* s/m  eq. 35 */
   double spin_radius, rolling_radius;                  /* m  eq. 38 */
-  double stop_stiffness, stop_damping;                 /* N m/rad, N m s/rad  eq. 39 */
+  double lock_stiffness, lock_damping;                 /* N m/rad, N m s/rad  of locked joints */
   double kp, kd, torque_max, speed_max, rotor_inertia, coulomb_friction;
   double stall_torque, back_emf;                /* N m, N m s/rad  eq. 48 */
   double free_damping, limit_damping;           /* N m s/rad  below the motor's limits, on them */
@@ -159,6 +165,7 @@ typedef struct hxCommand {
   double time;   /* s  time of the command, from which kinematic drives extrapolate (eq. 13) */
   double supply; /* 1  voltage of the supply over servo.voltage (eq. 53) */
   double duty[HX_JOINTS][HX_SLOTS]; /* 1  share of the duty limit that heat leaves (eq. 52) */
+  double strength[HX_JOINTS][HX_SLOTS]; /* 1  share of its limits that a motor has */
 } hxCommand;
 
 /* Commands that servos hold until the bus transmits the next ones, legs innermost. */
@@ -273,6 +280,8 @@ typedef struct hxState {
   double call_input;      /* 1  checksum of its input, a whole number; 0: no such call */
   double supply;          /* 1  hxCommand.supply and duty of the last call */
   double duty[HX_JOINTS][HX_SLOTS];
+  double locked[HX_JOINTS][HX_SLOTS]; /* 1    1: the joint is locked */
+  double held[HX_JOINTS][HX_SLOTS];   /* rad  where it was locked */
   hxBus bus;
   hxPlantMotion motion;
   hxContactState contact;

@@ -172,7 +172,7 @@ def test_compare_leaves_results_figures_report_and_the_scenario_as_run(
         "seeds.csv",
     }
     assert {path.name for path in (folder / "plots").iterdir()} == {
-        f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")
+        f"{name}.svg" for name in FIGURES
     }
     for control in CONTROLS:
         assert {path.name for path in (folder / control).iterdir()} == RUN

@@ -12,9 +12,9 @@ from gains import PERIOD
 from standing import ROBOT, WEIGHT, Laws, make_laws, plan, squeezing
 
 from hexapod_cosim.controller import Parts
-from hexapod_cosim.controller.sense.contact_detection import ContactDetector, SensorWatch
-from hexapod_cosim.controller.sense.landing import Landings
-from hexapod_cosim.controller.sense.touchdown import Touchdown
+from hexapod_cosim.controller.sense.contact_detection import ContactDetector
+from hexapod_cosim.controller.sense.touchdown import Landings, Touchdown
+from hexapod_cosim.controller.sense.trust import SensorWatch
 
 LOAD, CYCLE, SAMPLE = 50.0, 1.0, 0.005  # N, s, s
 NO_LEGS, ALL_LEGS = np.zeros(6, dtype=bool), np.ones(6, dtype=bool)

@@ -45,6 +45,8 @@ FAULTS = (
     "{time=0.7, duration=0.1, leg='RF', fault='dead'}, {time=0.8, leg='LF', fault='late', "
     "delay=0.013}, {time=0.9, duration=0.2, leg='RM', joint='tibia', fault='dead'}, "
     "{time=1.3, duration=0.2, leg='LR', joint='coxa', fault='stuck'}, "
+    "{time=1.4, duration=0.2, leg='LF', joint='all', fault='weak'}, "
+    "{time=1.4, duration=0.2, leg='RM', fault='noisy'}, "
     "{time=1.6, duration=0.03, lost='command'}, {time=1.7, duration=0.02, lost='step'}]"
 )
 PUSH = "events=[{time=0.7, duration=0.103, force=[0, 12, 0], torque=[0.1, 0, 0]}]"

@@ -196,36 +196,34 @@ def test_a_delay_changes_when_noise_is_measured_and_recordings_show_the_truth() 
     np.testing.assert_array_equal(recording.columns(CONTACT)[:, 0], np.arange(11) % 2 == 0)
 
 
+def test_a_noisy_force_sensor_reads_the_force_times_random_numbers_of_the_seed() -> None:
+    noisy = "{time=0.01, duration=0.03, leg='LM', fault='noisy', noise=0.2}"
+    measured, _ = sensed(noisy, "seed=7")
+    factor = 1.0 + 0.2 * np.random.default_rng(7).standard_normal((11, 6, 3))[:10, 1, 2]
+    true = np.arange(10) + 1.0
+    np.testing.assert_array_equal(forces(measured, 1)[2:8], (true * factor)[2:8])
+    np.testing.assert_array_equal(forces(measured, 1)[8:], true[8:])
+    np.testing.assert_array_equal(forces(measured, 0), true)
+
+
 # ------------------------------------------------------------------------------------------------
 # servos and commands
 
 
-def test_a_stuck_servo_stays_at_its_true_angle_whatever_its_sensor_reads() -> None:
-    sensor = "{time=0, sensor='angle', leg='LF', joint='femur', fault='nan'}"
-    servo = "{time=0.015, leg='LF', joint='femur', fault='stuck', duration=0.02}"
-    _, recording = sensed(f"{sensor}, {servo}")
-    for name, expected in (
-        ("angle_ref", [0, 1, 2, 0.003, 0.003, 0.003, 0.003, 7, 8, 9]),
-        ("speed_ref", [0, 1, 2, 0, 0, 0, 0, 7, 8, 9]),
-        ("torque_ref", [0, 1, 2, 0, 0, 0, 0, 7, 8, 9]),
-    ):
-        found = recording.column(f"LF.femur.{name}")[:STEPS]
-        np.testing.assert_array_equal(found, expected)
-        np.testing.assert_array_equal(recording.column(f"LF.tibia.{name}")[:STEPS], range(10))
+@pytest.mark.parametrize("fault", ["dead", "stuck"])
+def test_the_older_names_of_servo_faults_are_limp_and_locked(fault: str) -> None:
+    event = "events=[{{time=0.015, leg='RM', joint='tibia', fault='{}'}}]"
+    older, newer = (
+        make_schedule(load_scenario("walk_flat", overrides=["duration=0.05", event.format(name)]))
+        for name in (fault, {"dead": "limp", "stuck": "locked"}[fault])
+    )
+    np.testing.assert_array_equal(older.servos, newer.servos)
 
 
-def test_a_dead_servo_follows_its_joint_without_torque() -> None:
-    _, recording = sensed("{time=0.015, leg='RM', joint='tibia', fault='dead'}")
-    for name, factor in (("angle_ref", 0.001), ("speed_ref", 0.1), ("torque_ref", 0.0)):
-        found = recording.column(f"RM.tibia.{name}")[:STEPS]
-        np.testing.assert_array_equal(found[3:], factor * np.arange(3, 10))
-        assert found[2] == 2.0
-
-
-def test_a_kinematic_drive_has_no_dead_servo() -> None:
-    dead = "events=[{time=0.1, leg='RM', joint='tibia', fault='dead'}]"
-    scenario = load_scenario("walk_flat", overrides=[dead, "servo.mode=kinematic"])
-    with pytest.raises(ScenarioError, match=r"RM\.tibia dead at 0\.1 s.*servo\.mode=torque"):
+def test_a_kinematic_drive_has_no_faulty_servo() -> None:
+    limp = "events=[{time=0.1, leg='RM', joint='tibia', fault='limp'}]"
+    scenario = load_scenario("walk_flat", overrides=[limp, "servo.mode=kinematic"])
+    with pytest.raises(ScenarioError, match=r"RM\.tibia limp at 0\.1 s.*servo\.mode=torque"):
         simulate(scenario)
 
 
@@ -259,6 +257,8 @@ def test_the_last_command_stays_while_commands_are_lost_but_for_the_first(lost: 
         ("{time=1, sensor='attitude', leg='LF', fault='dead'}", "leg"),
         ("{time=1, sensor='angle', leg='LF', fault='dead'}", "joint"),
         ("{time=1, duration=1, lost='all'}", "'all'"),
+        ("{time=1, leg='LF', joint='all', fault='weak', share=2}", "share"),
+        ("{time=1, sensor='attitude', fault='noisy'}", "'noisy'"),
     ],
 )
 def test_an_event_that_makes_no_sense_is_refused(event: str, message: str) -> None:
@@ -283,7 +283,7 @@ def test_events_are_described_in_order_and_survive_a_scenario_file() -> None:
         "the angle sensor of LM.coxa repeats its last reading",
         "the attitude sensor reads level and at rest",
         "the force sensor of LM is late by 20 ms, for 2 s",
-        "the servo of RF.coxa is dead: it follows the joint without torque, for 0.5 s",
+        "the servo of RF.coxa is limp, for 0.5 s",
         "a push of [0, 40, 0] N and [0, 0, 0] N m, for 0.1 s",
         "the joint commands are lost, and the last one holds, for 0.1 s",
         "macro-steps are dropped: the last readings and joint commands hold, for 0.5 s",

@@ -1,13 +1,11 @@
 """The stances in which the design linearises a robot: six legs and tripods. They are tested for
-robots of all sizes and distributions of mass. Also the search of the stance of least heat, and the
-robot file that it writes.
+robots of all sizes and distributions of mass. Also the search of the stance of least heat.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,12 +21,9 @@ from hexapod_cosim.cosim.design.stance import (
     StanceDesign,
     find_stance,
     walked,
-    with_stance,
-    write_robot,
 )
 from hexapod_cosim.cosim.design.standing import lifted_stance, loads, rest
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.robot import robot_path
 
 PERIOD = 0.005  # s
 STILL = 1e-3  # m or rad    that a robot at rest moves by in a second; feet creep by some 0.1 mm
@@ -214,7 +209,7 @@ def test_similar_robots_beyond_the_usual_sizes_get_similar_gains() -> None:
     assert large.support.load_time == pytest.approx(small.support.load_time * time)
 
 
-# Tests the search of the stance of least heat, and the robot file that it writes.
+# Tests the search of the stance of least heat.
 
 ATHENA = load_robot("athena")
 
@@ -240,19 +235,7 @@ def test_the_found_stance_is_as_firm_and_as_slow_as_required() -> None:
     assert after == walked(found().robot, make_gait(ATHENA))
 
 
-def test_the_written_file_is_the_robot_with_the_stance(tmp_path: Path) -> None:
-    moved = with_stance(ATHENA, -0.02, 0.01)
-    file = write_robot(robot_path("athena"), moved, tmp_path / "low.toml", name="low")
-    read = load_robot(file)
-    assert read.name == "low"
-    np.testing.assert_array_equal(read.stance, moved.stance)
-    assert replace(read, name="athena", legs=ATHENA.legs) == replace(ATHENA, legs=ATHENA.legs)
-
-
-def test_a_urdf_is_not_written_and_a_stance_without_reach_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(GainsError, match="URDF is not written"):
-        write_robot(Path("robot.urdf"), ATHENA, tmp_path / "x.toml", name="x")
-    assert not list(tmp_path.iterdir())
+def test_a_stance_without_reach_is_refused() -> None:
     far = replace(ATHENA, gait=replace(ATHENA.gait, stride=0.6))
     with pytest.raises(GainsError, match="do not reach the steps"):
         find_stance(far)

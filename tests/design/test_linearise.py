@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from design_check import check_design
 
 from hexapod_cosim.controller import Gains, LegSolver
 from hexapod_cosim.controller.design.closed import disturbed
@@ -17,7 +18,6 @@ from hexapod_cosim.controller.design.standing import ANGLES, StandingPlant, weig
 from hexapod_cosim.cosim.design.gains import STANCES, design_for, level_fmu, standing_plants
 from hexapod_cosim.cosim.design.linearise import STATES, Bench, linearise
 from hexapod_cosim.cosim.design.standing import StanceError, rest
-from hexapod_cosim.cosim.design.verification import check_design
 from hexapod_cosim.cosim.interface.names import foot_vector_names
 from hexapod_cosim.models import Robot, load_robot
 

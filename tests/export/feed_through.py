@@ -33,7 +33,7 @@ DESCRIPTION = f"""<?xml version="1.0" encoding="UTF-8"?>
       <Real unit="rad0.5" start="0.5"/>
     </ScalarVariable>
     <ScalarVariable name="swing" valueReference="3" causality="input">
-      <Real unit="rad" start="0.1"/>
+      <Real unit="rad" start="0.05"/>
     </ScalarVariable>
     <ScalarVariable name="{JOINT}.angle_ref" valueReference="4" causality="output">
       <Real unit="rad"/>

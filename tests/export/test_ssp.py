@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import io
 import math
 import zipfile
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from feed_through import FOOT, JOINT, make_feed_through
-from fmpy.ssp.ssd import read_ssd, read_ssv
+from fmpy.ssp.ssd import read_ssd
 
 from hexapod_cosim.cosim.common.plant_files import fmi2_platform
 from hexapod_cosim.cosim.export.plant import export_fmu
@@ -30,10 +28,10 @@ from hexapod_cosim.models.errors import FmuError
 from tools.importers.package import run
 
 STEP, STEPS = 0.005, 60  # s
+SWING = 0.05  # rad    start value of the controller
 EXPERIMENT = Experiment(step=STEP, stop=0.3)
 ORDER = ("plant", "controller")
 SEEN = (f"plant.{JOINT}.angle", f"controller.{JOINT}.angle_ref", "plant.torso.position[3]")
-SWING = 0.05  # rad
 
 
 @pytest.fixture(scope="module")
@@ -46,11 +44,8 @@ def fmus(athena_fmu: Path, controller: Path) -> dict[str, Path]:
     return {"plant": athena_fmu, "controller": controller}
 
 
-def pack(folder: Path, fmus: dict[str, Path], **values: float) -> Path:
-    given = {"controller": {"swing": SWING, **values}}
-    return export_ssp(
-        folder / "athena.ssp", fmus, title="athena", experiment=EXPERIMENT, values=given
-    )
+def pack(folder: Path, fmus: dict[str, Path]) -> Path:
+    return export_ssp(folder / "athena.ssp", fmus, title="athena", experiment=EXPERIMENT)
 
 
 @pytest.fixture(scope="module")
@@ -58,18 +53,8 @@ def package(fmus: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> 
     return pack(tmp_path_factory.mktemp("package"), fmus)
 
 
-def parameters(package: Path, component: str) -> dict[str, Any]:
-    with zipfile.ZipFile(package) as archive:
-        return {
-            one.name: one
-            for one in read_ssv(io.BytesIO(archive.read(f"resources/{component}.ssv"))).parameters
-        }
-
-
 def test_a_package_is_valid_by_the_standards_schemas(package: Path) -> None:
     assert read_ssd(str(package), validate=True).system.elements
-    for component in ORDER:
-        assert read_ssv(str(package), f"resources/{component}.ssv", validate=True).parameters
 
 
 def test_the_package_contains_the_fmus_unchanged(package: Path, fmus: dict[str, Path]) -> None:
@@ -120,38 +105,6 @@ def test_connectors_are_the_fmus_variables_with_their_units(
             )
 
 
-def test_parameter_sets_hold_the_fmu_s_start_values_to_the_last_bit(
-    package: Path, fmus: dict[str, Path]
-) -> None:
-    found = parameters(package, "plant")
-    for variable in read_description(fmus["plant"]).modelVariables:
-        if variable.causality == "parameter" and variable.type == "Real":
-            assert float(found[variable.name].value) == float(variable.start)
-            assert found[variable.name].unit in {variable.unit, None}
-
-
-def test_every_used_unit_is_defined_and_units_without_integer_exponents_are_left_out(
-    package: Path,
-) -> None:
-    with zipfile.ZipFile(package) as archive:
-        text = archive.read("resources/plant.ssv").decode()
-    used = {one.unit for one in parameters(package, "plant").values() if one.unit}
-    assert "kg.m2" in used
-    assert all(f'<ssc:Unit name="{unit}">' in text for unit in used)
-    assert parameters(package, "controller")["gain"].unit is None  # the square root of a base unit
-
-
-def test_values_given_replace_start_values_and_inputs_that_are_driven_are_not_set(
-    package: Path,
-) -> None:
-    found = parameters(package, "controller")
-    assert set(found) == {"start", "gain", "swing"}
-    assert float(found["swing"].value) == SWING
-    driven = parameters(package, "plant")
-    assert f"{JOINT}.angle_ref" not in driven
-    assert "LM.coxa.angle_ref" in driven
-
-
 def test_a_controller_with_feed_through_holds_its_law_at_every_point(package: Path) -> None:
     found = run(package, SEEN, step=STEP, steps=STEPS, order=ORDER, in_order=True)
     angle, reference = found.column(SEEN[0]), found.column(SEEN[1])
@@ -177,15 +130,6 @@ def test_components_that_share_no_names_are_refused(controller: Path, tmp_path: 
 def test_an_input_with_two_drivers_is_refused(fmus: dict[str, Path], tmp_path: Path) -> None:
     with pytest.raises(FmuError, match="two drivers"):
         pack(tmp_path, fmus | {"second": fmus["controller"]})
-
-
-@pytest.mark.parametrize("name", ["swimg", f"{JOINT}.angle", f"{JOINT}.angle_ref"])
-def test_a_value_of_an_unknown_or_connected_variable_or_an_output_is_refused(
-    fmus: dict[str, Path], tmp_path: Path, name: str
-) -> None:
-    with pytest.raises(FmuError, match="no such value"):
-        pack(tmp_path, fmus, **{name: 0.1})
-    assert not list(tmp_path.iterdir())
 
 
 def test_fmus_of_different_versions_are_refused(fmus: dict[str, Path], tmp_path: Path) -> None:

@@ -143,9 +143,7 @@ def maps() -> dict[str, bytes]:
     png, npy = io.BytesIO(), io.BytesIO()
     Image.fromarray(heights.astype(np.uint16)).save(png, format="PNG")
     np.save(npy, heights)
-    head = "ncols 5\nnrows 4\nxllcorner 0\nyllcorner 0\ncellsize 0.1\nNODATA_value -9999\n"
-    rows = "\n".join(" ".join(map(str, row)) for row in heights)
-    return {"map.png": png.getvalue(), "map.npy": npy.getvalue(), "map.asc": (head + rows).encode()}
+    return {"map.png": png.getvalue(), "map.npy": npy.getvalue()}
 
 
 MAPS = maps()

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 import tomlkit
+from PIL import Image
 
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.report.relief import write_heights
 from hexapod_cosim.cosim.results.support import body_height
 from hexapod_cosim.cosim.results.warnings import off_map_warnings, overlap_warnings
 from hexapod_cosim.cosim.run.plant import provide_grid
@@ -53,18 +53,15 @@ def test_patches_are_tables_of_a_scenario() -> None:
 
 
 def test_a_height_map_lies_beside_its_scenario(tmp_path: Path) -> None:
-    stones = make_surface("course", {})
-    keys = write_heights(stones, tmp_path / "map.png")
-    lines = [f"{key} = {value!r}" for key, value in keys.items()]
-    text = "\n".join(["[terrain]", 'kind = "heightfield"', 'file = "map.png"', *lines])
+    levels = np.array([[0, 20, 0], [0, 0, 10]], np.uint16)
+    Image.fromarray(levels).save(tmp_path / "map.png")
+    text = """[terrain]\nkind = "heightfield"\nfile = "map.png"
+    horizontal_scale = 0.5\nvertical_scale = 0.001"""
     (tmp_path / "walk.toml").write_text(text, encoding="utf-8")
-    robot = scenario_robot(load_scenario(tmp_path / "walk.toml"))
-    surface = robot.terrain.surface
+    surface = scenario_robot(load_scenario(tmp_path / "walk.toml")).terrain.surface
     assert surface is not None
-    assert surface.kind == "blocks"
-    assert surface.extent == pytest.approx(stones.extent)
-    scale = keys["vertical_scale"]
-    assert surface.height + robot.terrain.height == pytest.approx(stones.height, abs=0.51 * scale)
+    assert surface.kind == "smooth"
+    assert surface.height[::-1] == pytest.approx(0.001 * levels)
 
 
 REFUSED = [
@@ -75,7 +72,13 @@ REFUSED = [
     (["terrain.kind=stairs", "terrain.step_height=3 deg"], "m or mm or cm"),
     (["terrain.kind=stairs", "terrain.patch=[{x=9, y=0, size=1, mu=0.1}]"], "leaves the map"),
     (["terrain.kind=plane", "terrain.patch=[{x=0, y=0, size=1, soil='mood'}]"], "soil"),
-    (["terrain.kind=heightfield", "terrain.file=nowhere.png"], "cannot read"),
+    (
+        [
+            *("terrain.kind=heightfield", "terrain.file=nowhere.png"),
+            *("terrain.horizontal_scale=0.1", "terrain.vertical_scale=0.001"),
+        ],
+        "cannot read",
+    ),
 ]
 
 

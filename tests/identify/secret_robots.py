@@ -19,8 +19,8 @@ from hexapod_cosim.cosim.interface.plant import plant_roots
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.extensions.identify.experiment import JOINTS, Experiment, of_point, readings
 from hexapod_cosim.extensions.identify.log import ATTITUDE, CHANNELS, Log, log_of
-from hexapod_cosim.extensions.identify.log_plant import LogPlant
 from hexapod_cosim.extensions.identify.numbers import Unknown
+from hexapod_cosim.extensions.identify.plant import LogPlant
 from hexapod_cosim.extensions.identify.unknowns import (
     DELAYS,
     START,
@@ -34,7 +34,6 @@ Array = NDArray[np.float64]
 # standard deviations: encoders of 12 bits, current sensing, load cells, a small IMU, mocap
 NOISE = {
     "angle": 1e-3,
-    "motor_angle": 2e-4,
     "speed": 0.02,
     "torque": 0.03,
     "current": 0.02,

@@ -23,14 +23,11 @@ from hexapod_cosim.extensions.identify.fitting.least_squares import (
     remaining_step,
 )
 from hexapod_cosim.extensions.identify.fitting.misfit import (
-    dependences,
     determined,
     sharpened,
     to_keep,
 )
-from hexapod_cosim.extensions.identify.fitting.search import finished, tried
-from hexapod_cosim.extensions.identify.identify import QUANTILE, Estimate
-from hexapod_cosim.extensions.identify.unknowns import ROBOT
+from hexapod_cosim.extensions.identify.identification import QUANTILE, Estimate
 
 Array = NDArray[np.float64]
 ROWS, COLUMNS, RUNS = 240, 6, 200
@@ -86,7 +83,7 @@ def coverage(slow: float, *, white: bool) -> Array:
     for _ in range(RUNS):
         noise = coloured(rng, slow)
         found = np.linalg.lstsq(jacobian.reshape(-1, 3), noise.ravel(), rcond=None)[0]
-        series = [Series("angle", noise - jacobian @ found, jacobian, 1.0)]
+        series = [Series(noise - jacobian @ found, jacobian, 1.0)]
         information = white_information(series) if white else coloured_information(series)
         inside += np.abs(found) < QUANTILE * np.sqrt(np.diag(np.linalg.inv(information)))
     return np.asarray(inside / RUNS)
@@ -108,7 +105,7 @@ def test_intervals_for_white_residuals_miss_where_these_are_slow() -> None:
 def test_the_spectrum_of_an_autoregression_is_its_closed_form() -> None:
     """S = (1 - a^2) / (1 - 2 a cos w + a^2) at frequency w [rad/row]."""
     rng, jacobian = np.random.default_rng(5), np.zeros((ROWS, COLUMNS, 1))
-    series = [Series("angle", coloured(rng, 0.5), jacobian, 1.0) for _ in range(50)]
+    series = [Series(coloured(rng, 0.5), jacobian, 1.0) for _ in range(50)]
     found = np.mean([spectrum(one, np.eye(1)) for one in series], axis=0)
     expected = 0.75 / (1.25 - np.cos(np.linspace(0.0, np.pi, len(found))))
     assert found == pytest.approx(expected, rel=0.1)
@@ -130,7 +127,6 @@ def test_a_number_is_not_determined_by_what_was_known_of_its_partner() -> None:
     assert determined(information).tolist() == [False, False, True]
     kept = to_keep(information, ALL_THREE)
     assert kept.tolist() == [False, True, False]
-    assert dependences(information, kept, ALL_THREE) == {0: [1]}
 
 
 def test_what_readings_determine_well_stays_so() -> None:
@@ -170,81 +166,6 @@ def test_errors_of_derivatives_are_no_information() -> None:
     assert np.linalg.eigvalsh(found.T @ found)[1:] == pytest.approx(expected, rel=1e-3)
 
 
-class Steep:
-    """Stands for a problem of a number of which 1600 readings say 40, and of which 100 others have
-    a slope of 1.3 between -0.01 and 0.01 priors alone, as near a foot that barely lifts.
-    """
-
-    RANGE = 0.01  # priors
-
-    def bounds(self) -> tuple[Array, Array]:
-        return np.full(1, -8.0), np.full(1, 8.0)
-
-    def residuals(self, z: Array) -> Array:
-        near = np.clip(z[0], -self.RANGE, self.RANGE)
-        return np.concatenate([np.full(1600, np.sqrt(0.025) * z[0]), np.full(100, 1.3 * near), z])
-
-
-def test_slopes_that_end_within_the_deviation_are_no_information() -> None:
-    """Such slopes made intervals of masses three times too narrow."""
-    problem: Any = Steep()
-    z, step = np.zeros(1), 0.5 * Steep.RANGE
-    jacobian = (problem.residuals(z + step) - problem.residuals(z - step))[:, None] / (2.0 * step)
-    assert float(jacobian[:-1, 0] @ jacobian[:-1, 0]) == pytest.approx(40.0 + 100.0 * 1.3**2)
-    for _ in range(2):
-        slopes = jacobian[:-1]
-        jacobian = sharpened(problem, z, jacobian, slopes.T @ slopes)
-    assert 40.0 <= float(jacobian[:-1, 0] @ jacobian[:-1, 0]) < 45.0
-
-
-class Jumping:
-    """Stands for a problem of two numbers whose first readings jump by 3 where z[0] is above 0.3.
-
-    The optimum of the other readings is at (0.8, -0.4).
-    """
-
-    READINGS, JUMPING = 60, slice(0, 6)
-
-    def __init__(self) -> None:
-        self.matrix = np.random.default_rng(7).normal(size=(self.READINGS, 2))
-        self.right = self.matrix @ np.array([0.8, -0.4])
-        self.counted = self.known = np.ones(self.READINGS, dtype=np.bool_)
-        self.left = np.zeros(self.READINGS, dtype=np.bool_)
-
-    def bounds(self) -> tuple[Array, Array]:
-        return np.full(2, -8.0), np.full(2, 8.0)
-
-    def residuals(self, z: Array) -> Array:
-        found = self.matrix @ z - self.right
-        found[self.JUMPING] += 3.0 * (z[0] > 0.3)
-        return np.where(self.counted, found, 0.0)
-
-    def jacobian(self, _z: Array, _slopes: Any) -> Array:
-        return self.matrix * self.counted[:, None]
-
-    def errors(self, _z: Array) -> Array:
-        return np.zeros(0)
-
-    def set_noise(self, _errors: Array) -> None: ...
-
-    def leave_out_bent(self, _z: Array) -> None:
-        self.counted = self.counted & ~self.left
-
-    def leave_out_nonlinear(self, change: Array, linear: Array) -> bool:
-        jump = np.abs(change - linear) > 0.05
-        new = bool(np.any(self.counted & jump))
-        self.left |= jump
-        self.counted = self.counted & ~jump
-        return new
-
-
-def test_the_search_passes_readings_that_jump() -> None:
-    problem: Any = Jumping()
-    start = np.array([0.2, 0.0])
-    assert finished(problem, start, lambda _text: None) == pytest.approx([0.8, -0.4], abs=1e-9)
-    assert np.flatnonzero(~problem.counted).tolist() == [0, 1, 2, 3, 4, 5]
-
-
 def test_a_difference_over_a_jump_is_bent_and_one_of_a_curve_is_not() -> None:
     """Readings z, z^2 and z + (z > 0.005) at z = 0, moved by 0.01 to both sides. The slope of the
     second is that of one side, 0.01 off; that of the third is the one without the jump.
@@ -254,25 +175,6 @@ def test_a_difference_over_a_jump_is_bent_and_one_of_a_curve_is_not() -> None:
     slope, bend = differences([(0.01, forth), (-0.01, back)], 3)
     assert bend == pytest.approx([0.0, 2e-4, 1.0], abs=1e-12)
     assert slope == pytest.approx([1.0, -0.01, 1.0], abs=1e-12)
-
-
-class Valleys:
-    """Stands for a problem whose sum of squares has two valleys, the deeper one at 1.9."""
-
-    rows = tuple(row for row in ROBOT if row.key in ("servo.kp", "contact.restitution"))
-    counted = known = np.ones(2, dtype=np.bool_)
-
-    def bounds(self) -> tuple[Array, Array]:
-        return np.full(2, -8.0), np.full(2, 8.0)
-
-    def residuals(self, z: Array) -> Array:
-        return np.array([min(abs(z[1]) + 1.0, 2.0 * abs(z[1] - 1.9)), z[0]])
-
-
-def test_another_start_of_a_contact_leads_out_of_a_wrong_valley() -> None:
-    problem: Any = Valleys()
-    assert tried(problem, np.zeros(2)).tolist() == [0.0, 2.0]
-    assert tried(problem, np.array([0.0, 2.0])).tolist() == [0.0, 1.9]
 
 
 def test_an_interval_is_written_with_the_digits_in_which_its_ends_differ() -> None:

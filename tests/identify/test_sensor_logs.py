@@ -1,6 +1,4 @@
-"""Numbers of sensors: each kind has its own delay, readings have biases and angles have zeros; and
-contacts are found from joint angles alone.
-"""
+"""Numbers of sensors: each kind has its own delay, readings have biases and angles have zeros."""
 
 from __future__ import annotations
 
@@ -12,8 +10,8 @@ from scipy.optimize import root
 from secret_robots import secret_robot
 
 from hexapod_cosim.extensions.identify.fitting.search import ENOUGH
-from hexapod_cosim.extensions.identify.identify import QUANTILE, identify
-from hexapod_cosim.extensions.identify.identify_files import warnings
+from hexapod_cosim.extensions.identify.identification import QUANTILE, identify
+from hexapod_cosim.extensions.identify.results import warnings
 from hexapod_cosim.extensions.identify.start import standing_attitude
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.kinematics import axis_quaternion, foot_positions, quaternion_product
@@ -21,7 +19,6 @@ from hexapod_cosim.models.kinematics import rotation_matrix as rotation
 
 KINDS = ("joints", "currents", "forces", "imu", "pose")
 ROLL, PITCH = 0.05, -0.08  # rad
-WIDE = 3.0  # deviations, beyond which one of 100 numbers is with a probability of 0.24
 
 
 def test_delays_and_biases_lie_within_their_intervals(plant_build: Path, tmp_path: Path) -> None:
@@ -82,17 +79,3 @@ def test_the_attitude_of_a_standing_robot_is_that_of_its_feet() -> None:
     )
     found = standing_attitude(robot, leaning(robot, turn))
     assert found == pytest.approx((ROLL, PITCH), abs=1e-12)
-
-
-def test_contacts_are_found_from_joint_angles_alone(plant_build: Path, tmp_path: Path) -> None:
-    """The sum of squares has a curved valley here: mass and its place act alike."""
-    groups = ("mass", "contact")
-    secret = secret_robot(63, tmp_path, duration=4.0, groups=groups)
-    log = secret.log.without([name for name in secret.log.measured if not name.endswith(".angle")])
-    found = identify([log], load_robot("athena"), groups=groups)
-    own = {one.key: one for one in found.estimates}
-    for key in ("contact.stiffness", "contact.restitution", "friction.mu", "friction.slope"):
-        one = own[key]
-        assert one.determined, key
-        true, half = secret.values[key], 0.5 * (one.high - one.low) * WIDE / QUANTILE
-        assert abs(one.value - true) < half, key

@@ -105,7 +105,7 @@ def test_keys_walk_and_turn_the_robot(live: LivePage) -> None:
     live.place()
     live.page.keyboard.down("w")
     live.until("frame.position[0] > 0.03")
-    assert live.page.locator("[data-key=KeyW].held").count() == 1
+    assert live.page.locator("[data-key=KeyW].pressed").count() == 1
     live.page.keyboard.down("ArrowLeft")
     live.until(f"{HEADING} > 0.1")
     live.page.keyboard.up("w")

@@ -9,15 +9,12 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 
 from hexapod_cosim.models import RobotError, load_robot, robot_from_table
-from hexapod_cosim.models.ground.curriculum import column_names
 from hexapod_cosim.models.ground.faces import ground_height
 from hexapod_cosim.models.ground.grid_file import (
     HEADER,
@@ -29,9 +26,7 @@ from hexapod_cosim.models.ground.grid_file import (
 from hexapod_cosim.models.ground.smooth import height_and_slopes, heights_at
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.table import CATALOGUE, make_surface, merged_terrain, terrain_table
-from hexapod_cosim.models.mjcf import robot_to_mjcf
-from hexapod_cosim.models.mjcf_ground import rectangles
-from hexapod_cosim.models.records import Array, Terrain
+from hexapod_cosim.models.records import Terrain
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
 MADE = [name for name in CATALOGUE if name != "heightfield"]
@@ -150,51 +145,6 @@ def test_difficulty_raises_what_is_not_given() -> None:
     assert height(difficulty=1.0, step_height=0.02) == pytest.approx(0.02)
 
 
-def tile(surface: Surface, row: int, column: int, *, blocks: int, border: int) -> Array:
-    """Returns the heights of a tile of a curriculum, whose edges have this many blocks [m]."""
-    below, left = border + column * blocks, border + row * blocks
-    return surface.height[below : below + blocks, left : left + blocks]
-
-
-def test_steps_of_a_curriculum_rise_along_its_rows_and_tiles_fit_together() -> None:
-    given = {"terrains": "pyramid_stairs, inverted_pyramid_stairs", "num_rows": 3, "num_cols": 2}
-    surface = make_surface("curriculum", given)
-    assert surface.extent == pytest.approx((-3.0, 11.0, -7.0, 3.0), abs=1e-12)
-    level = surface.height[0, 0]  # of the border
-    for row, step in enumerate((0.025, 0.07, 0.115)):  # m: difficulty 0, 0.5, 1
-        for column, sign in enumerate((1.0, -1.0)):
-            heights = tile(surface, row, column, blocks=80, border=20) - level
-            assert np.abs(np.diff(heights, axis=1)).max() == pytest.approx(step, abs=1e-12)
-            assert heights[0] == pytest.approx(0.0, abs=1e-12)  # an edge
-            assert sign * heights[40, 40] == pytest.approx(np.abs(heights).max(), abs=1e-12)
-    assert surface.height[60, 60] != 0.0  # a column beside the start's
-    assert surface.height[20 + 80 + 40, 60] == 0.0
-
-
-def test_columns_of_a_curriculum_have_their_proportions_as_in_legged_gym() -> None:
-    """Its five terrains and their shares of 20 columns, by its names."""
-    names = ("smooth_slope", "rough_slope", "stairs_up", "stairs_down", "discrete")
-    values = SimpleNamespace(
-        terrains=" ".join(names), terrain_proportions="0.1, 0.1, 0.35, 0.25, 0.2", num_cols=20
-    )
-    found = column_names(values)
-    assert [found.count(name) for name in names] == [2, 2, 7, 5, 4]
-    values.terrain_proportions = "equal"
-    assert column_names(values)[:6] == [*names, names[0]]
-
-
-def test_a_curriculum_of_slopes_is_smooth_and_has_their_inclines() -> None:
-    given = {"terrains": "smooth_slope inverted_pyramid_slope", "num_rows": 3, "num_cols": 2}
-    surface = make_surface("curriculum", given)
-    assert surface.kind == "smooth"
-    assert height_and_slopes(surface, 0.0, 0.0)[0] == 0.0
-    for row, slope in enumerate((0.0, 0.2, 0.4)):  # difficulty 0, 0.5, 1
-        for y, sign in ((-4.0, -1.0), (0.0, 1.0)):
-            slopes = height_and_slopes(surface, 4.0 * row + 1.25, y)[1]
-            # heights are multiples of 60 nm, and their nodes 50 mm apart
-            assert slopes == pytest.approx([sign * slope, 0.0], abs=2e-6)
-
-
 def test_random_heights_are_multiples_of_the_vertical_scale() -> None:
     surface = make_surface("rubble", {"vertical_scale": 0.004, "max_height": 0.04})
     levels = surface.height / 0.004
@@ -225,10 +175,6 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
     ("heightfield", {}, "file"),
     ("stairs", {"size": 0.2}, r"covers the whole map: got 'size 0\.2 m.*at least 0\.9 m"),
     ("stairs", {"num_steps": 100}, r"on a map of 4 m', expected at most 11 steps; .*size=30\.8"),
-    ("curriculum", {"terrains": "stairs plane"}, "unknown terrain of tiles"),
-    ("curriculum", {"terrain_proportions": "1 2"}, "4 numbers >= 0, one for each of pyramid_st"),
-    ("curriculum", {"size": 0.8}, "platforms cover their tiles"),
-    ("curriculum", {"num_rows": 1000, "num_cols": 1000}, "the curriculum is too large"),
 ]
 
 
@@ -312,35 +258,3 @@ def test_a_urdf_and_a_table_give_the_ground_back(tmp_path: Path) -> None:
     assert load_robot(path).hash == robot.hash
     table = terrain_table(robot.terrain)
     assert robot_from_table(table_with(table), where="test").terrain == robot.terrain
-
-
-def test_rectangles_cover_each_block_once() -> None:
-    height = make_surface("discrete_obstacles", {}).height
-    count = np.zeros(height.shape, dtype=int)
-    for row, rows, column, columns in rectangles(height):
-        part = height[row : row + rows, column : column + columns]
-        assert np.all(part == part[0, 0])
-        count[row : row + rows, column : column + columns] += 1
-    assert np.all(count == 1)
-
-
-@pytest.mark.parametrize("name", ["stairs", "random_uniform", "stepping_stones", "course"])
-def test_mujoco_reads_the_same_heights(name: str) -> None:
-    terrain = replace(on_grid(make_surface(name, {})), height=0.25)
-    robot = replace(load_robot("athena"), terrain=terrain)
-    model = mujoco.MjModel.from_xml_string(robot_to_mjcf(robot))
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    data.qpos[2] += 50.0  # the robot is out of the rays' way
-    mujoco.mj_forward(model, data)
-    surface = terrain.surface
-    assert surface is not None
-    shift = 0.0 if surface.kind == "smooth" else 0.5
-    # within blocks, and at nodes, where triangles and the bicubic surface agree; a ray exactly on
-    # the edge between two triangles would miss both
-    for row, column in np.random.default_rng(2).integers(1, 40, (40, 2)).tolist():
-        x = surface.x0 + surface.cell * (column + shift) + 2e-6
-        y = surface.y0 + surface.cell * (min(row, surface.rows - 2) + shift) + 1e-6
-        start, down = np.array([x, y, 10.0]), np.array([0.0, 0.0, -1.0])
-        way = mujoco.mj_ray(model, data, start, down, None, 1, -1, np.zeros(1, dtype=np.int32))
-        assert 10.0 - way == pytest.approx(ground_height(terrain, x, y), abs=5e-6)

@@ -12,7 +12,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models import Robot, RobotError, Terrain, load_robot
+from hexapod_cosim.models.ground.table import make_surface
 from hexapod_cosim.models.mjcf import joint_mobility, robot_to_mjcf
 
 STIFFNESS, DAMPING = 344.0, 2.0  # N m/rad, N m s/rad
@@ -109,6 +110,12 @@ def test_joint_stops_are_the_spring_and_damper_of_the_plant() -> None:
         virtual = -0.001 / 0.999 * acceleration  # of the constraint's regularisation
         assert data.qfrc_constraint[6 + joint] == pytest.approx(expected + virtual, rel=1e-6)
         assert data.qfrc_constraint[6 + joint] == pytest.approx(expected, rel=STOP)
+
+
+def test_a_robot_on_a_surface_is_refused() -> None:
+    stairs = Terrain(kind="grid", surface=make_surface("stairs", {}))
+    with pytest.raises(RobotError, match="got 'stairs', expected flat or slope"):
+        robot_to_mjcf(replace(load_robot("athena"), terrain=stairs))
 
 
 def test_shapes_of_torso_knees_and_shanks_are_those_of_the_robot_file() -> None:

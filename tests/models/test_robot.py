@@ -144,8 +144,8 @@ BAD: list[tuple[str, Callable[[Table], None], list[str]]] = [
     ),
     (
         "text for number",
-        lambda t: put(t, "torso.mass", "2.6 kg"),
-        ["torso.mass", "'2.6 kg'", "[kg]"],
+        lambda t: put(t, "torso.mass", "2.6 km"),
+        ["torso.mass", "'2.6 km'", "kg or g"],
     ),
     ("number for table", lambda t: put(t, "torso", 3.0), ["torso", "expected a table"]),
     ("number for vector", lambda t: put(t, "torso.com", 0.0), ["torso.com", "3 numbers [m]"]),

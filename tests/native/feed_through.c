@@ -23,7 +23,9 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
                               fmi2Boolean logging) {
   (void)name, (void)type, (void)guid, (void)resources, (void)callbacks, (void)visible,
       (void)logging;
-  return calloc(1, sizeof(Instance));
+  Instance *self = calloc(1, sizeof(Instance));
+  if (self) self->real[START] = 0.4, self->real[GAIN] = 0.5, self->real[SWING] = 0.05;
+  return self;
 }
 
 void fmi2FreeInstance(fmi2Component c) { free(c); }

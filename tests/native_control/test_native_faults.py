@@ -126,7 +126,8 @@ class LowGround:
         assert compliant is not None
         lowered, awaited = compliant.laws.touchdown.offset, controller.plan.paths.clock.awaited
         measurement.foot_force[:, 2] += 12.0 * (awaited & (lowered < -0.012))
-        measurement.foot_force[2] *= not (controller.plan.paths.clock.swinging[2] and lowered[2] > -0.012)
+        swings = controller.plan.paths.clock.swinging[2]
+        measurement.foot_force[2] *= not (swings and lowered[2] > -0.012)
         measurement.foot_force[3] *= step % 700 < 500
         self.held.append(controller.plan.paths.clock.held)
 

@@ -28,6 +28,7 @@ from hexapod_cosim.models.kinematics import (
     skew,
 )
 from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.servos.motor import Power
 
 # relative: the same formula with its operations in another order, some hundred roundings
 SAME = 1e-13
@@ -327,14 +328,19 @@ def test_the_servo_is_the_twins_and_its_slopes_are_its_derivatives(
         rng.normal(0.0, 1.0, (200, 3)) * [0.1, 4.0, 2.0],
         strict=True,
     ):
+        strength = float(rng.choice((1.0, 0.3, 0.0)))
 
-        def torque(angle: float, speed: float, refs: Array = command) -> float:
-            return float(servo_torque(servo, *np.array([[angle], [speed], *refs[:, None]]))[0])
+        def torque(
+            angle: float, speed: float, refs: Array = command, given: float = strength
+        ) -> float:
+            at = np.array([[angle], [speed], *refs[:, None]])
+            return float(servo_torque(servo, *at, power=Power(1.0, 1.0, given))[0])
 
         def total(speed: float, angle: float = q) -> float:
             return torque(angle, speed) + float(gear_friction(servo, np.array([speed]))[0])
 
-        got = probed(core.hx_probe_servo, plant, float(q), float(qd), command, size=4)
+        asked = np.append(command, strength)
+        got = probed(core.hx_probe_servo, plant, float(q), float(qd), asked, size=4)
         assert got[:2] == pytest.approx(
             [torque(q, qd), float(gear_friction(servo, np.array([qd]))[0])], rel=SAME
         )

@@ -35,6 +35,7 @@ from hexapod_cosim.models.kinematics import body_states, joint_models
 from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.schema import parse_toml, require
 from hexapod_cosim.models.servos.motor import (
+    Power,
     electrical_power,
     friction_drag,
     friction_torque,
@@ -71,8 +72,11 @@ def test_the_plants_servos_are_the_twins(core: ct.CDLL, name: str, mode: str) ->
         angle, speed, *told = rng.normal(0.0, [0.3, 2.0, 0.3, 1.0, 3.0])
         motor, external = rng.normal(0.0, 3.0, 2)
         state = [np.array([value]) for value in (angle, speed, *told)]
-        torque, slopes = servo_torque(servo, *state), servo_slopes(servo, *state)
-        got = probed(core.hx_probe_servo, plant, angle, speed, np.array(told), size=4)
+        power = Power(1.0, 1.0, float(rng.choice((1.0, 0.3, 0.0))))
+        torque = servo_torque(servo, *state, power=power)
+        slopes = servo_slopes(servo, *state, power=power)
+        given = np.array([*told, power.strength])
+        got = probed(core.hx_probe_servo, plant, angle, speed, given, size=4)
         drag = servo.coulomb_friction / servo.friction_speed
         drag *= 1.0 - math.tanh(speed / servo.friction_speed) ** 2
         assert got[[0, 2]] == pytest.approx([torque[0], slopes[0][0]], rel=SAME, abs=SAME)

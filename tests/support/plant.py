@@ -183,8 +183,8 @@ def _put_settings(d: Any, robot: Robot) -> None:
     put(d.gravity, robot.gravity)
 
 
-def inputs(command: Command) -> Any:
-    """Returns the HxInput of a command."""
+def inputs(command: Command, lock: Array | None = None) -> Any:
+    """Returns the HxInput of a command and of locks (6, 3)."""
     i: Any = HxInput()
     for name in (
         "angle_ref",
@@ -195,6 +195,8 @@ def inputs(command: Command) -> Any:
         "acceleration_ref",
     ):
         put(getattr(i, name), getattr(command, name))
+    put(i.strength, np.broadcast_to(command.power.strength, (LEGS, JOINTS)))
+    put(i.lock, np.zeros((LEGS, JOINTS)) if lock is None else lock)
     return i
 
 
@@ -232,13 +234,16 @@ class Plant:
         """Returns the command that holds the stance."""
         return Command(angle_ref=self.robot.stance)
 
-    def step(self, t_end: float, command: Command | None = None) -> None:
-        """Steps to t_end [s] under a command, by default that of the stance."""
-        self._check(self.core.hx_plant_step(self.handle, inputs(command or self.hold()), t_end))
+    def step(self, t_end: float, command: Command | None = None, lock: Array | None = None) -> None:
+        """Steps to t_end [s] under a command, by default that of the stance, and locks (6, 3)."""
+        given = inputs(command or self.hold(), lock)
+        self._check(self.core.hx_plant_step(self.handle, given, t_end))
 
     def step_ramp(self, t_end: float, command: Command, rate: Command) -> None:
         """Steps to t_end [s] under a command that changes at a rate [1/s]."""
-        self._check(self.core.hx_plant_step_ramp(self.handle, inputs(command), inputs(rate), t_end))
+        change = inputs(rate)
+        put(change.strength, np.zeros((LEGS, JOINTS)))
+        self._check(self.core.hx_plant_step_ramp(self.handle, inputs(command), change, t_end))
 
     def step_to_event(self, t_end: float, command: Command, *, stop: bool = True) -> bool:
         """Steps to t_end [s], with `stop` to the next event at most; returns whether there was an

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from fmpy.ssp.ssd import read_ssd, read_ssv
+from fmpy.ssp.ssd import read_ssd
 
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_block import FmuBlock
@@ -97,9 +97,7 @@ def run(
 
 @contextmanager
 def opened(package: Path, *, end: float) -> Iterator[InitialisedPackage]:
-    """Yields a package's components with its parameter sets, initialized at time 0 for a run until
-    `end` [s].
-    """
+    """Yields a package's components, initialized at time 0 for a run until `end` [s]."""
     described = read_ssd(str(package))
     with ExitStack() as stack:
         folder = Path(stack.enter_context(TemporaryDirectory()))
@@ -107,19 +105,9 @@ def opened(package: Path, *, end: float) -> Iterator[InitialisedPackage]:
             archive.extractall(folder)
         components = {}
         for element in described.system.elements:
-            fmu = components[element.name] = stack.enter_context(
+            components[element.name] = stack.enter_context(
                 Fmu(folder / element.source, name=element.name)
             )
-            for parameter in read_ssv(
-                str(folder / element.source.replace(".fmu", ".ssv"))
-            ).parameters:
-                block = fmu.block([parameter.name])
-                block.values[0] = float(
-                    parameter.value in {"true", "1"}
-                    if parameter.type == "Boolean"
-                    else parameter.value
-                )
-                block.set()
         ends = [
             (one.startElement, one.startConnector, one.endElement, one.endConnector)
             for one in described.system.connections

@@ -18,7 +18,7 @@ typedef struct {
 } hxSaved;
 
 static const uint64_t magic = 0x72746e6f43507868u; /* "hxPContr" */
-static const uint64_t saved_version = 7;
+static const uint64_t saved_version = 8;
 /* 1, of a period: a tick that is later than the present time by less than this is due */
 static const double clock_tolerance = 0.01;
 
@@ -116,7 +116,7 @@ static void begin_again(hxController *controller) {
 hxStatus hx_controller_change_control(hxController *controller, int control) {
   char message[HX_MESSAGE_SIZE];
   hxControllerState *state = present(controller);
-  const hxFootPathsModel paths = model_of(controller)->paths;
+  const hxFootPathsModel paths = model_of(controller)->plan.paths;
   const int before = controller->definition.control;
   controller->definition.control = control;
   const hxStatus status = hx_controller_definition_check(&controller->definition, message);
@@ -137,7 +137,7 @@ hxStatus hx_controller_change_control(hxController *controller, int control) {
 
 static double next_tick(const hxController *controller) {
   const hxControllerState *state = state_of(controller);
-  return state->start + (double)state->tick * model_of(controller)->period;
+  return state->start + (double)state->tick * model_of(controller)->plan.period;
 }
 
 static int is_finite(const hxControllerOutput *output) {
@@ -151,7 +151,7 @@ static int is_finite(const hxControllerOutput *output) {
 
 /* Computes the state after the next tick under an input in the place of the other state, unless it
  * is there, and returns it. Inputs consist of doubles only. */
-static const hxControllerState *look_ahead(hxController *controller,
+static const hxControllerState *tick_ahead(hxController *controller,
                                            const hxControllerInput *input) {
   hxControllerState *next = &controller->state[1 - controller->now];
   if (controller->is_ahead && memcmp(&controller->input, input, sizeof *input) == 0) return next;
@@ -166,14 +166,14 @@ void hx_controller_output(hxController *controller, const hxControllerInput *inp
                           hxControllerOutput *output) {
   const hxControllerState *state = state_of(controller);
   const int due =
-      next_tick(controller) - state->time <= clock_tolerance * model_of(controller)->period;
-  *output = due ? look_ahead(controller, input)->output : state->output;
+      next_tick(controller) - state->time <= clock_tolerance * model_of(controller)->plan.period;
+  *output = due ? tick_ahead(controller, input)->output : state->output;
 }
 
 /* Executes the next tick; the first one of a step leaves the state before it as the other one. */
 static void tick(hxController *controller, const hxControllerInput *input, int first) {
   if (first) {
-    look_ahead(controller, input);
+    tick_ahead(controller, input);
     controller->now = 1 - controller->now;
   } else {
     hx_controller_tick(model_of(controller), input, present(controller));
@@ -202,7 +202,7 @@ hxStatus hx_controller_step(hxController *controller, const hxControllerInput *i
   }
   const hxStatus status = hx_controller_input_check(input, controller->message);
   if (status != HX_OK) return status;
-  while (t_end - next_tick(controller) > clock_tolerance * model_of(controller)->period) {
+  while (t_end - next_tick(controller) > clock_tolerance * model_of(controller)->plan.period) {
     hxControllerInput ramped;
     if (rate) ramp_input(input, rate, fmax(next_tick(controller) - start, 0.0), &ramped);
     tick(controller, rate ? &ramped : input, controller->now == before);

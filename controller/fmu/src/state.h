@@ -4,53 +4,26 @@
 #ifndef HX_CONTROLLER_STATE_H
 #define HX_CONTROLLER_STATE_H
 
-#include "comply/compliant.h"
 #include "comply/paper.h"
 #include "hexapod/inside.h"
+#include "plan.h"
 #include "walk/fade.h"
 
 HX_HIDDEN_BEGIN
 
 typedef struct hxControllerModel {
-  double period;        /* s */
-  int compliant, paper; /* this control, otherwise kinematic control */
+  int paper; /* the paper's control; otherwise compliant or kinematic control */
   hxGait gait;
-  hxLegSolver leg[HX_LEGS];
-  hxCommandRampModel ramp;
-  hxFootPathsModel paths;
-  hxCompliantModel laws;
+  hxWalkPlanModel plan;
   hxPaperModel corrections; /* of the paper's control */
   hxFadeModel fade;
 } hxControllerModel;
-
-/* One planned step. It depends on the command alone. Feet are in the walking frame. */
-typedef struct hxPlannedStep {
-  double value[HX_COMMANDS],
-      rate[HX_COMMANDS]; /* vx vy yaw_rate height roll pitch, and per second */
-  hxPosture posture;
-  hxPlannedFeet feet;
-  hxPlane sway;               /* m, of the torso against the swinging legs (C54) */
-  hxPlane plane[HX_LEGS];     /* m, of the feet from the torso that sways */
-  double activation[HX_LEGS]; /* 1 */
-  double lowering[HX_LEGS];   /* m, deformation of the ground */
-  double height[HX_LEGS];     /* m, of the lowered feet */
-  hxPlane shift[HX_LEGS];     /* m, of contact points, by rolling */
-  hxPose pose[HX_LEGS];
-  hxMasses masses;
-} hxPlannedStep;
 
 typedef struct hxControllerState {
   double start; /* s, time of the first tick */
   double time;  /* s */
   int64_t tick; /* number of the next tick */
-  hxCommandRamp ramp;
-  hxFootPaths paths;
-  int64_t at;   /* the present step, counted from the beginning of its section */
-  int64_t last; /* the step at which the command comes to rest and is planned again */
-  int cut;      /* the present step is the last of its section: a leg lifts off or touches down */
-  int has_before, has_after; /* the neighbours of the present step are planned */
-  int present;               /* index of the present step in `step`, a ring buffer */
-  hxPlannedStep step[3];
+  hxWalkPlan plan;
   hxCompliant compliant;
   hxPaper paper;
   hxFade fade;  /* from the control before */

@@ -3,13 +3,12 @@
 
 #include <string.h>
 
-/* what keeps the plant's joint commands, or changes them: lost commands and faults of servos */
+/* keeps the plant's joint commands where new ones are lost */
 static void adjust(void *owner) {
   hxMaster *master = owner;
   double *drive = master->stepper.value + master->drive_place;
   const size_t bytes = master->drive_count * sizeof *drive;
   if (master->lost && master->lost[master->step]) memcpy(drive, master->drive, bytes);
-  hx_servos_break(&master->servos, master->step, master->stepper.value);
   memcpy(master->drive, drive, bytes);
 }
 

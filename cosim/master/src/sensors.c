@@ -1,11 +1,7 @@
-/* sensors.c - errors of sensors and servos. */
+/* sensors.c - errors of sensors. */
 #include "hexapod/sensors.h"
 
-#include <math.h>
 #include <string.h>
-
-/* ----------------------------------------------------------------------------------------------
- * sensors */
 
 /* remembers the numbers of this moment, with their noise */
 static void remember(const hxSensors *sensors, size_t moment, const double *row) {
@@ -51,27 +47,4 @@ void hx_sensors_read(const hxSensors *sensors, size_t moment, double *row) {
     const double *number = numbers_of(sensors, i, moment);
     for (size_t j = 0; number && j < sensors->size; ++j) row[reading[j]] = number[j];
   }
-}
-
-/* ----------------------------------------------------------------------------------------------
- * servos */
-
-static void break_one(const hxServos *servos, size_t i, int fault, double *row) {
-  const double angle = row[servos->angle[i]];
-  double *stuck_at = servos->stuck_at + i;
-  if (fault != HX_FAULT_STUCK) *stuck_at = (double)NAN;
-  if (fault == HX_FAULT_NONE) return;
-  if (fault == HX_FAULT_STUCK && isnan(*stuck_at)) *stuck_at = angle;
-  /* a servo without torque follows its joint, so that its own law gives none */
-  const int stuck = fault == HX_FAULT_STUCK;
-  row[servos->angle_ref[i]] = stuck ? *stuck_at : angle;
-  row[servos->speed_ref[i]] = stuck ? 0.0 : row[servos->speed[i]];
-  row[servos->torque_ref[i]] = 0.0;
-  row[servos->acceleration_ref[i]] = 0.0;
-}
-
-void hx_servos_break(const hxServos *servos, size_t moment, double *row) {
-  const int some = moment < servos->moments;
-  for (size_t i = 0; i < servos->count; ++i)
-    break_one(servos, i, some ? servos->fault[moment * servos->count + i] : HX_FAULT_NONE, row);
 }

@@ -1,4 +1,4 @@
-import type { PackedRun } from "./types";
+import type { Packed } from "./types";
 
 /** The unpacked columns of a run by name, and the search for times among its rows. */
 export class Recording {
@@ -50,7 +50,7 @@ export class Recording {
 }
 
 /** Unpacks what cosim/report/packing.py has packed. */
-export async function unpack(run: PackedRun): Promise<Recording> {
+export async function unpack(run: Packed): Promise<Recording> {
   const planes = await inflate(run.data);
   const size = run.rows * (run.columns.length + 2);
   const steps = new Uint16Array(size);
@@ -76,7 +76,7 @@ export async function unpack(run: PackedRun): Promise<Recording> {
 }
 
 /** Returns the bytes of a base64 text that zlib compressed. */
-export async function inflate(text: string): Promise<Uint8Array> {
+async function inflate(text: string): Promise<Uint8Array> {
   const raw = atob(text);
   const bytes = new Uint8Array(raw.length);
   for (let k = 0; k < raw.length; k++) bytes[k] = raw.charCodeAt(k);

@@ -9,7 +9,6 @@ import { unpack } from "./recording";
 import { Actor } from "./scene/actor";
 import { Stage } from "./scene/stage";
 import { Relief, unpackSurface } from "./scene/surface";
-import { contourDistance } from "./scene/terrain";
 import { enlargement, findStances } from "./scene/trails";
 import { property, readColours, Theme } from "./theme";
 import { listenToKeys, makeWindowButtons, Transport } from "./transport";
@@ -152,17 +151,6 @@ async function addTrails(stage: Stage): Promise<void> {
   });
   const note = byId("trail-note");
   if (note) note.textContent = enlarged > 1 ? `slip trails, ${enlarged} × as long` : "slip trails";
-  nameContours(stage);
-}
-
-/** Tells in the legend how far apart the contours are. */
-function nameContours(stage: Stage): void {
-  const surface = stage.actors.find(({ relief }) => relief.surface)?.relief.surface;
-  const apart = surface ? contourDistance(surface) : 0;
-  const note = byId("contour-note");
-  if (!note || apart <= 0) return;
-  note.textContent = `contours every ${Number((1e3 * apart).toPrecision(3))} mm`;
-  note.parentElement?.removeAttribute("hidden");
 }
 
 /** Makes one plot after the other; between them the browser can handle other tasks. */

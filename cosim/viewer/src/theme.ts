@@ -2,17 +2,9 @@ import { Color } from "three";
 
 /** Custom properties of the page's style sheet with the colours that the 3D view needs. */
 const NAMES = [
-  "sky",
-  "floor",
-  "grid",
-  "force",
-  "print",
-  "contour",
-  "edge",
-  "soil",
-  "slippery",
-  "patch",
-] as const;
+  ...(["sky", "floor", "grid", "force", "contact", "contour", "edge"] as const),
+  ...(["soil", "slippery", "patch"] as const),
+];
 
 export type Colours = Readonly<Record<(typeof NAMES)[number], Color>> & { readonly dark: boolean };
 

@@ -26,16 +26,12 @@ export interface Robot {
   readonly thickness: readonly number[];
 }
 
-/** A footprint in soil: begin, end (0: it stays) [s], x and y, depth below the surface, radius [m]. */
-export type PackedFootprint = readonly [number, number, number, number, number, number];
-
 /** A plane; with `surface`, the number of the surface whose heights are above the plane's. */
 export interface Ground {
   readonly height: number;
   readonly rise: number;
   readonly heading: number;
   readonly surface?: number;
-  readonly footprints?: readonly PackedFootprint[];
 }
 
 export interface Material {
@@ -43,36 +39,34 @@ export interface Material {
   readonly text: string;
 }
 
-export interface PackedSurface {
-  readonly kind: "smooth" | "blocks";
-  readonly name: string;
+/** Columns packed by cosim/report/packing.py: name, size of a step and value of step 0. */
+export interface Packed {
   readonly rows: number;
-  readonly columns: number;
+  readonly start: number;
+  readonly tick: number;
+  readonly columns: readonly (readonly [string, number, number])[];
+  readonly data: string;
+}
+
+/** A grid of heights and materials, row by row; `across`: the number of columns of the grid. */
+export interface PackedSurface extends Packed {
+  readonly kind: "smooth" | "blocks";
+  readonly across: number;
   readonly x0: number;
   readonly y0: number;
   readonly cell: number;
-  readonly low: number;
-  readonly step: number;
-  readonly data: string;
   readonly materials: readonly Material[];
-  readonly material: string;
 }
 
-export interface PackedRun {
+export interface PackedRun extends Packed {
   readonly label: string;
   /** The name of the run in the style sheet. */
   readonly key: string;
   /** Lengths of strokes and gaps of its curves [px]; none for a whole line. */
   readonly dash: readonly number[];
   readonly period: number;
-  readonly bucket: number;
   readonly robot: Robot;
   readonly ground: Ground;
-  readonly rows: number;
-  readonly start: number;
-  readonly tick: number;
-  readonly columns: readonly (readonly [string, number, number])[];
-  readonly data: string;
 }
 
 export interface Payload {

@@ -34,7 +34,6 @@ class Series:
     Readings that do not count are 0, with their derivatives.
     """
 
-    key: str  # of the channel
     residuals: Array  # (rows, columns)  in deviations
     slopes: Array  # (rows, columns, numbers)  by z
     counted: float  # share of the readings that count

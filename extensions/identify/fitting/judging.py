@@ -2,10 +2,9 @@
 
 The covariance is that of the linearised problem with the spectra of the residuals (covariance.py),
 plus the square of the step that the search left. Residuals larger than the noise of the readings
-themselves say that the model does not explain the log: they widen all intervals, and far larger
-ones reject the model. Numbers of the robot file that the readings do not determine (misfit.py) keep
-its values, and the search ends with them there. How far this moves the others is a part of their
-intervals.
+themselves say that the model does not explain the log, and widen all intervals. Numbers of the
+robot file that the readings do not determine (misfit.py) keep its values, and the search ends with
+them there. How far this moves the others is a part of their intervals.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from hexapod_cosim.extensions.identify.fitting.covariance import coloured_inform
 from hexapod_cosim.extensions.identify.fitting.least_squares import BOUND, FINE, remaining_step
 from hexapod_cosim.extensions.identify.fitting.misfit import (
     Misfit,
-    dependences,
     determined,
     misfits,
     read_noise,
@@ -37,7 +35,6 @@ Flags = NDArray[np.bool_]
 Progress = Callable[[str], None]
 # of deriving weak combinations anew: the first errors of derivatives hide some in others
 PASSES = 4
-ROUNDS = 3  # of keeping numbers at the file's values, at most
 
 
 @dataclass(frozen=True)
@@ -56,7 +53,6 @@ class Fit:
     decrement: float  # length of the step that the optimiser left, in deviations
     kept: Flags  # (rows,)  numbers of the robot file that keep its values
     alone: Flags  # (rows,)  numbers that the readings determine by themselves
-    depends: Mapping[str, tuple[str, ...]]  # numbers determined only with others as in the file
 
     @property
     def unexplained(self) -> dict[str, float]:
@@ -66,11 +62,6 @@ class Fit:
             if not one.explained:
                 found[key] = max(one.value, found.get(key, 0.0))
         return found
-
-    @property
-    def rejected(self) -> dict[str, float]:
-        """Returns the channels by which the model is rejected, with the mean square."""
-        return {key: one.value for key, one in self.misfit.items() if one.rejected}
 
     @property
     def values(self) -> dict[str, float]:
@@ -97,24 +88,16 @@ def fit(problem: Problem, *, progress: Progress = lambda _text: None) -> Fit:
     fitted, best = searched(problem, progress)
     progress("what the log determines")
     least = read_noise(fitted.experiments)
-    of_file = np.array([row.group in OF_FILE for row in problem.rows])
-    kept = np.zeros(len(best), dtype=np.bool_)
-    z, own = best, _evidence(fitted, best, least)
-    for _ in range(ROUNDS):
-        more = kept | to_keep(own.information, of_file)
-        if any(one.rejected for one in own.misfit.values()) or np.array_equal(more, kept):
-            break
-        kept, z = more, np.where(more, 0.0, z)
-        if float(np.max(np.abs(z - best))) > FINE.near:
-            with fitted.keeping(kept):
-                z = finished(fitted, z, lambda _text: None)
-        own = _evidence(fitted, z, least)
+    own = _evidence(fitted, best, least)
+    kept = to_keep(own.information, np.array([row.group in OF_FILE for row in problem.rows]))
+    z = np.where(kept, 0.0, best)
     with fitted.keeping(kept):
+        if not np.array_equal(z, best):
+            z = finished(fitted, z, lambda _text: None)
+            own = _evidence(fitted, z, least)
         # where touch-downs make the sum of squares rough, the optimiser stops on the way
         left = remaining_step(own.jacobian, own.residuals, z, fitted.bounds())
     moved = z - best
-    keys = [row.key for row in problem.rows]
-    depends = dependences(own.information, kept, of_file)
     return Fit(
         rows=problem.rows,
         before=problem.before,
@@ -128,7 +111,6 @@ def fit(problem: Problem, *, progress: Progress = lambda _text: None) -> Fit:
         decrement=float(np.sqrt(left @ np.linalg.solve(own.covariance, left))),
         kept=kept,
         alone=determined(own.information),
-        depends={keys[k]: tuple(keys[j] for j in others) for k, others in depends.items()},
     )
 
 
@@ -150,7 +132,7 @@ class _Evidence:
 def _evidence(fitted: Problem, z: Array, least: Mapping[str, float]) -> _Evidence:
     """Returns what the readings say at some numbers. least: noise of the readings, by channel."""
     fitted.set_noise(fitted.errors(z))
-    fitted.leave_out_bent(z)
+    fitted.leave_out_bent(z, FINE)
     jacobian, residuals = fitted.jacobian(z, FINE), fitted.residuals(z)
     misfit = misfits(fitted.experiments, fitted.predictions(z), least, "fitted")
     # errors of the model count as noise

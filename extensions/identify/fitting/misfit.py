@@ -15,13 +15,20 @@ from hexapod_cosim.extensions.identify.fitting.least_squares import UNLIKE
 from hexapod_cosim.extensions.identify.fitting.problem import Problem
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 SMALLEST = 1e-9  # noise, in the units of the channels
 CLIPPED = 5.0  # deviations    of a residual in the test whether the model explains the log
 # Largest mean square of residuals over that of the readings' noise, of many readings. That of the
 # noise has a relative deviation of about 3.8 over the root of their number.
 EXPLAINED = 1.1
-REJECTED = 2.0  # likewise: errors of the model are as large as the noise, and move all numbers
 UNCERTAIN, DEVIATIONS = 3.8, 3.0
+DETERMINED = 0.5  # of the prior deviation: a number with less is determined by the logs
+NEARLY_NULL = 1.0  # information [1/prior^2] of a combination: less than what was known before
+# deviation of a number by nearly null combinations alone, from which on it is not determined
+BY_NULL = 1.0 / 3.0  # priors
+WEAK = 1000.0  # information [1/prior^2] of a combination that is simulated as a whole
+LEAST = 0.05  # information [1/prior^2] of a combination that says nothing whatever its errors are
+LONGEST = 0.5  # priors    of such a move
 
 
 @dataclass(frozen=True)
@@ -34,16 +41,7 @@ class Misfit:
     @property
     def explained(self) -> bool:
         """Whether the noise of the readings may be all of it."""
-        return self.value <= EXPLAINED + self._uncertain
-
-    @property
-    def rejected(self) -> bool:
-        """Whether errors of the model are as large as the noise."""
-        return self.value > REJECTED + self._uncertain
-
-    @property
-    def _uncertain(self) -> float:
-        return DEVIATIONS * UNCERTAIN / float(np.sqrt(self.readings))
+        return self.value <= EXPLAINED + DEVIATIONS * UNCERTAIN / float(np.sqrt(self.readings))
 
 
 def read_noise(experiments: Sequence[Experiment]) -> dict[str, float]:
@@ -86,17 +84,6 @@ def misfits(
     }
 
 
-Flags = NDArray[np.bool_]
-DETERMINED = 0.5  # of the prior deviation: a number with less is determined by the logs
-NEARLY_NULL = 1.0  # information [1/prior^2] of a combination: less than what was known before
-# deviation of a number by nearly null combinations alone, from which on it is not determined
-BY_NULL = 1.0 / 3.0  # priors
-WEAK = 1000.0  # information [1/prior^2] of a combination that is simulated as a whole
-LEAST = 0.05  # information [1/prior^2] of a combination that says nothing whatever its errors are
-LONGEST = 0.5  # priors    of such a move
-PART = 0.05  # slope of a number by another one, from which on it depends on it
-
-
 def sharpened(problem: Problem, z: Array, jacobian: Array, information: Array) -> Array:
     """Returns the derivatives with those by weak combinations from simulations over long steps.
 
@@ -132,7 +119,11 @@ def sharpened(problem: Problem, z: Array, jacobian: Array, information: Array) -
 
 
 def determined(information: Array) -> Flags:
-    """Returns which numbers readings of an information (rows, rows) determine (rows,)."""
+    """Returns which numbers readings of an information (rows, rows) determine (rows,).
+
+    These have at most half of the deviation that they had before, and no large share in a
+    combination of numbers of which the readings say less than was known.
+    """
     covariance = np.linalg.inv(information + np.eye(len(information)))
     small = np.sqrt(np.diag(covariance)) < DETERMINED
     values, vectors = np.linalg.eigh(information)
@@ -155,21 +146,3 @@ def to_keep(information: Array, candidates: Flags) -> Flags:
             return kept
         deviations = np.diag(np.linalg.inv(own + np.eye(len(own))))
         kept[free[int(np.argmax(np.where(open_ones, deviations, -1.0)))]] = True
-
-
-def dependences(information: Array, kept: Flags, candidates: Flags) -> dict[int, list[int]]:
-    """Returns the numbers that readings determine only together with kept ones, and these.
-
-    kept: numbers that stay at the file's values. candidates: numbers that may depend on them.
-    """
-    free, others = np.flatnonzero(~kept), np.flatnonzero(kept)
-    if not len(others):
-        return {}
-    covariance = np.linalg.inv(information[np.ix_(free, free)] + np.eye(len(free)))
-    slopes = covariance @ information[np.ix_(free, others)]
-    alone = determined(information)
-    return {
-        k: others[np.abs(own) > PART].tolist()
-        for k, own in zip(free.tolist(), slopes, strict=True)
-        if candidates[k] and not alone[k]
-    }

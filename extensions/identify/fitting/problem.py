@@ -7,9 +7,9 @@ file's, in units of what was known of them beforehand (priors), which are the la
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from itertools import repeat
+from queue import SimpleQueue
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,20 +19,18 @@ from hexapod_cosim.extensions.identify.experiment import (
     first_part,
     needs_simulation,
     readings,
-    simulate_in_worker,
     simulated,
 )
 from hexapod_cosim.extensions.identify.fitting.covariance import Series
 from hexapod_cosim.extensions.identify.fitting.least_squares import (
-    FINE,
     ROUGH,
     Differences,
     Slopes,
     differences,
 )
 from hexapod_cosim.extensions.identify.log import CHANNELS, LogError
-from hexapod_cosim.extensions.identify.log_plant import LogPlant
 from hexapod_cosim.extensions.identify.numbers import Unknown
+from hexapod_cosim.extensions.identify.plant import LogPlant
 from hexapod_cosim.extensions.identify.unknowns import is_delay
 from hexapod_cosim.models import FmuError, Robot
 
@@ -46,47 +44,45 @@ MOST_RESIDUALS = 150_000  # rows are thinned evenly where there would be more
 JUMP = 1.0  # second difference of a simulated signal [deviations]
 BESIDE = 6  # rows before and after a jump
 BENT = 0.05  # deviations    second difference over short steps of a number, of a reading that jumps
-# A larger share of readings that change otherwise than derivatives say does not jump: the valley of
-# the sum of squares is curved, and a shorter step follows it.
-CURVED = 0.1
 FLOOR = 1e-9  # smallest noise, in the units of the channels
 
 
 class Problem:
-    """Residuals and derivatives; readings of all fitted rows are in one array (predictions,)."""
+    """Residuals and derivatives; readings of all fitted rows are in one array (predictions,).
+
+    Args:
+        plants: FMUs of one robot; simulations for derivatives run on all of them at a time.
+        robot: this robot.
+        experiments: what is compared.
+        rows: the unknown numbers.
+        most: residuals, at most about.
+    """
 
     def __init__(
         self,
-        plant: LogPlant,
+        plants: Sequence[LogPlant],
         robot: Robot,
         experiments: Sequence[Experiment],
         rows: Sequence[Unknown],
-        pool: Executor | None = None,
+        *,
+        most: int = MOST_RESIDUALS,
     ) -> None:
-        """pool: worker processes that have opened the plant for the same experiments."""
-        self.plant, self.robot, self.pool = plant, robot, pool
-        self.rows = tuple(rows)
+        self.plants, self.robot = plants, robot
+        self.experiments, self.rows = tuple(experiments), tuple(rows)
         self.before = {row.key: row.read(robot) for row in rows}
-        self._kept: Flags = np.zeros(len(rows), dtype=np.bool_)  # see `keeping`
         self.noise: dict[str, float] = {}  # by channel
+        self._kept: Flags = np.zeros(len(rows), dtype=np.bool_)  # see `keeping`
         self._needs = np.array([needs_simulation(row) for row in rows], dtype=np.bool_)
         self.use({})
-        self._take(experiments, np.inf, MOST_RESIDUALS)
-
-    def _take(self, experiments: Sequence[Experiment], seconds: float, most: int) -> None:
-        """Takes experiments, of which the first seconds are simulated."""
-        self.experiments, self._seconds = tuple(experiments), seconds
-        rows = [np.arange(*one.fitted.indices(len(one.log.time))) for one in experiments]
-        size = sum(len(own) * len(one.columns) for own, one in zip(rows, experiments, strict=True))
-        self._fitted = [own[:: -(-size // most)] for own in rows]
+        own = [np.arange(*one.fitted.indices(len(one.log.time))) for one in experiments]
+        size = sum(len(a) * len(one.columns) for a, one in zip(own, experiments, strict=True))
+        self._fitted = [one[:: -(-size // most)] for one in own]
         self._measured = self._flat([one.measured for one in experiments])
         channels = [[ALL.index(key) for key in one.channels] for one in experiments]
         sides = zip(channels, self._fitted, strict=True)
         self._channels = np.concatenate([np.tile(keys, len(own)) for keys, own in sides])
         self.known = np.isfinite(self._measured)  # which readings are numbers
         self.counted = self.known.copy()  # and which of them count
-        self._differences: Differences | None = None  # the last ones
-        self._nonlinear: Flags = np.zeros_like(self.known)  # see leave_out_nonlinear
 
     def _flat(self, tables: Sequence[Array]) -> Array:
         """Returns the fitted rows that are not thinned out of tables (rows, columns)."""
@@ -98,17 +94,18 @@ class Problem:
     ) -> Problem:
         """Returns the problem of the first seconds of the logs, without held-out rows.
 
-        parameters: further ones of the FMU, by name. most: residuals, at most about.
+        parameters: further ones of the FMU, by name.
         """
-        found = Problem(self.plant, self.robot, self.experiments, self.rows, self.pool)
-        found._take([first_part(one, seconds) for one in self.experiments], seconds, most)
+        parts = [first_part(one, seconds) for one in self.experiments]
+        found = Problem(self.plants, self.robot, parts, self.rows, most=most)
         found.use(parameters)
         return found
 
     def use(self, parameters: Mapping[str, float]) -> None:
-        """Replaces the further parameters of the FMU. Simulated derivatives are kept."""
+        """Replaces the further parameters of the FMU."""
         self.parameters = dict(parameters)
         self._outputs: tuple[bytes, list[Array]] = (b"", [])  # of the last numbers
+        self._differences: Differences | None = None  # the last ones
 
     def bounds(self) -> tuple[Array, Array]:
         """Returns the limits of z, which are 0 of numbers that are kept."""
@@ -131,13 +128,13 @@ class Problem:
         """Returns the readings of each experiment (rows, columns)."""
         key = z[self._needs].tobytes()
         if self._outputs[0] != key or not self._outputs[1]:
-            self._outputs = key, self._simulated(z)
+            self._outputs = key, self._simulated(z, self.plants[0])
         return self._read(self._outputs[1], z)
 
-    def _simulated(self, z: Array) -> list[Array]:
+    def _simulated(self, z: Array, plant: LogPlant) -> list[Array]:
         values = self.values(z)
         return [
-            simulated(self.plant, one, self.robot, self.rows, values, self.parameters)
+            simulated(plant, one, self.robot, self.rows, values, self.parameters)
             for one in self.experiments
         ]
 
@@ -195,29 +192,10 @@ class Problem:
             tables.append(near.astype(float))
         self.counted = self.known & (self._flat(tables) == 0.0)
 
-    def leave_out_bent(self, z: Array) -> None:
-        """Makes readings not count that jump between the numbers at which derivatives are made, nor
-        those that jumped on the way there.
-        """
-        bent = self._known(z, FINE).bend / self._noises() > BENT
-        self.counted = self.counted & ~(bent | self._nonlinear)
-
-    def leave_out_nonlinear(self, change: Array, linear: Array) -> bool:
-        """Makes readings not count from now on that change otherwise than derivatives say.
-
-        Args:
-            change: of all residuals.
-            linear: what derivatives say of it.
-
-        Returns whether any reading is new among these.
-        """
-        flags = np.abs(change - linear)[: len(self._measured)] > BENT
-        if float(np.mean(flags)) > CURVED:
-            return False
-        new = bool(np.any(self.counted & flags))
-        self._nonlinear = self._nonlinear | flags
-        self.counted = self.counted & ~flags
-        return new
+    def leave_out_bent(self, z: Array, made: Slopes) -> None:
+        """Makes readings not count that jump between the numbers at which derivatives are made."""
+        bent = self._known(z, made).bend / self._noises() > BENT
+        self.counted = self.counted & ~bent
 
     def jacobian(self, z: Array, made: Slopes = ROUGH) -> Array:
         """Returns the residuals' derivatives (residuals, rows), by differences of simulations."""
@@ -234,13 +212,10 @@ class Problem:
     def _made(self, z: Array, made: Slopes) -> Differences:
         """Returns the differences of all predictions by each number."""
         base = self._flat(self.predictions(z))
-        points, steps = [], []
-        for k in range(len(z)):
-            for step in self._steps(k, z, made):
-                point = z.copy()
-                point[k] += step
-                points.append(point)
-                steps.append((k, step))
+        steps = [(k, step) for k in range(len(z)) for step in self._steps(k, z, made)]
+        points = np.tile(z, (len(steps), 1))
+        for point, (k, step) in zip(points, steps, strict=True):
+            point[k] += step
         changes: list[list[tuple[float, Array]]] = [[] for _ in z]
         outputs = self._all_outputs(points, [bool(self._needs[k]) for k, _ in steps])
         for (k, step), point, own in zip(steps, points, outputs, strict=True):
@@ -261,27 +236,28 @@ class Problem:
         steps = [step for step in both if low <= z[k] + step <= high]
         return steps if made.both or is_delay(row) else steps[:1]
 
-    def _all_outputs(
-        self, points: Sequence[Array], needed: Sequence[bool]
-    ) -> Iterator[list[Array] | None]:
+    def _all_outputs(self, points: Array, needed: Sequence[bool]) -> Iterator[list[Array] | None]:
         """Yields the simulated outputs at each point; None where the plant refuses it.
 
         needed: whether a point needs a simulation; one that moves a number of sensors does not.
+        The simulations do not depend on the FMU that makes them, nor the result on their order.
         """
-        base = self._outputs[1]
-        moved = [point for point, own in zip(points, needed, strict=True) if own]
-        if self.pool is None:
-            found: Iterator[list[Array] | None] = map(self._try, moved)
-        else:
-            common = repeat(self._seconds), repeat(self.parameters)
-            found = self.pool.map(simulate_in_worker, map(self.values, moved), *common)
-        yield from (next(found) if own else base for own in needed)
+        base, idle = self._outputs[1], SimpleQueue[LogPlant]()
+        for plant in self.plants:
+            idle.put(plant)
 
-    def _try(self, z: Array) -> list[Array] | None:
-        try:
-            return self._simulated(z)
-        except (LogError, FmuError):
-            return None
+        def simulate(z: Array) -> list[Array] | None:
+            plant = idle.get()
+            try:
+                return self._simulated(z, plant)
+            except (LogError, FmuError):
+                return None
+            finally:
+                idle.put(plant)
+
+        with ThreadPoolExecutor(len(self.plants)) as pool:
+            found = pool.map(simulate, points[np.array(needed, dtype=np.bool_)])
+            yield from (next(found) if own else base for own in needed)
 
     def series(self, jacobian: Array, residuals: Array) -> list[Series]:
         """Returns residuals and derivatives of each channel of each log, without the priors."""
@@ -296,5 +272,5 @@ class Problem:
             for key in dict.fromkeys(one.channels):
                 at = channels == key
                 share = float(np.mean(counted[:, at]))
-                found.append(Series(key, error[:, at], slopes[:, at], share))
+                found.append(Series(error[:, at], slopes[:, at], share))
         return found

@@ -1,4 +1,4 @@
-"""Numbers of servos: gains, motor, friction and elasticity of the gears."""
+"""Numbers of servos: gains, motor, friction of the gears."""
 
 from __future__ import annotations
 
@@ -13,13 +13,11 @@ from hexapod_cosim.models.records import Servo
 
 LINE: Callable[[Robot], bool] = lambda robot: robot.servo.drive == "line"  # noqa: E731
 MOTOR: Callable[[Robot], bool] = lambda robot: robot.servo.drive == "motor"  # noqa: E731
-ELASTIC: Callable[[Robot], bool] = lambda robot: robot.servo.gear_stiffness > 0.0  # noqa: E731
 # What terms of the friction of measured servos are, from `hexapod list servos` (M1 to M6):
 TERM = 0.5  # of the file's value, at least
 DRY = 0.02  # of the stall torque
 VISCOUS = 0.05  # of the stall torque at the no-load speed
 LOAD, SQUARE = 0.15, 0.01  # 1, 1/(N m)
-GEAR = ("servo.gear_stiffness", "servo.gear_damping", "servo.backlash")  # of elastic gears
 
 
 def _term(
@@ -108,11 +106,6 @@ SERVO = (
     section("servo.torque_constant", "N m/A", "servo", 0.2, applies=MOTOR),
     section("servo.resistance", "ohm", "servo", 0.2, applies=MOTOR),
     *FRICTION,
-    section("servo.gear_stiffness", "N m/rad", "servo", 0.5, applies=ELASTIC),
-    section("servo.gear_damping", "N m s/rad", "servo", 0.7, applies=ELASTIC),
-    section(
-        "servo.backlash", "rad", "servo", 0.003, positive=False, low=0.0, high=1.0, applies=ELASTIC
-    ),
 )  # fmt: skip
 
 

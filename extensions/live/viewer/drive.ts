@@ -88,8 +88,8 @@ export class Drive {
   }
 }
 
-/** Keys that move the robot while they are held, by their place on the keyboard. */
-const HELD: Record<string, readonly ["forward" | "left" | "turn", number]> = {
+/** Keys that move the robot while they are pressed, by their place on the keyboard. */
+const MOVES: Record<string, readonly ["forward" | "left" | "turn", number]> = {
   KeyW: ["forward", 1],
   ArrowUp: ["forward", 1],
   KeyS: ["forward", -1],
@@ -104,13 +104,13 @@ const HELD: Record<string, readonly ["forward" | "left" | "turn", number]> = {
 
 /** Listens to the keyboard; `actions` are done once at a key's press. */
 export class Keys {
-  private readonly held = new Set<string>();
+  private readonly pressed = new Set<string>();
 
   constructor(
     private readonly drive: Drive,
     private readonly actions: Readonly<Record<string, () => void>>,
   ) {
-    document.addEventListener("keydown", (event) => this.press(event));
+    document.addEventListener("keydown", (event) => this.keydown(event));
     document.addEventListener("keyup", (event) => this.release(event.code));
     // a key that is let go in another window gives no event
     window.addEventListener("blur", () => this.releaseAll());
@@ -118,20 +118,20 @@ export class Keys {
   }
 
   /** Presses a key of the page's own pad. */
-  hold(code: string): void {
-    this.held.add(code);
-    this.tell();
+  press(code: string): void {
+    this.pressed.add(code);
+    this.apply();
   }
 
   release(code: string): void {
-    if (this.held.delete(code)) this.tell();
+    if (this.pressed.delete(code)) this.apply();
   }
 
-  private press(event: KeyboardEvent): void {
+  private keydown(event: KeyboardEvent): void {
     if (event.ctrlKey || event.metaKey || event.altKey || usesKeys(event)) return;
-    if (HELD[event.code]) {
+    if (MOVES[event.code]) {
       event.preventDefault();
-      if (!event.repeat) this.hold(event.code);
+      if (!event.repeat) this.press(event.code);
       return;
     }
     const act = this.actions[event.code] ?? this.actions[event.key];
@@ -141,25 +141,25 @@ export class Keys {
   }
 
   private releaseAll(): void {
-    this.held.clear();
-    this.tell();
+    this.pressed.clear();
+    this.apply();
   }
 
-  private tell(): void {
+  private apply(): void {
     const axes = { forward: 0, left: 0, turn: 0 };
-    for (const code of this.held) {
-      const [axis, sign] = HELD[code];
+    for (const code of this.pressed) {
+      const [axis, sign] = MOVES[code];
       axes[axis] = Math.min(Math.max(axes[axis] + sign, -1), 1);
     }
     this.drive.axes = axes;
     for (const button of document.querySelectorAll<HTMLElement>("[data-key]"))
-      button.classList.toggle("held", this.isHeld(button.dataset.key!));
+      button.classList.toggle("pressed", this.isPressed(button.dataset.key!));
   }
 
-  /** Whether a key or its twin is held. */
-  private isHeld(code: string): boolean {
-    const [axis, sign] = HELD[code];
-    return [...this.held].some((one) => HELD[one][0] === axis && HELD[one][1] === sign);
+  /** Whether a key or its twin is pressed. */
+  private isPressed(code: string): boolean {
+    const [axis, sign] = MOVES[code];
+    return [...this.pressed].some((one) => MOVES[one][0] === axis && MOVES[one][1] === sign);
   }
 }
 

@@ -65,6 +65,7 @@ export class LocalLoop extends Listeners implements Connection {
   send({ type, key, value, action, ...input }: Record<string, unknown>): void {
     this.attempt(() => {
       if (type === "set") this.set(key as keyof Settings, value as string & number);
+      else if (type === "leg") this.do("leg", input.leg as number);
       else if (action === "place") this.place();
       else if (type === "do") this.status.paused = action === "pause";
       else Object.assign(this.input, input);

@@ -2,14 +2,10 @@
 
 import type { Ground, PackedSurface, Robot } from "../../../cosim/viewer/src/types";
 
-/** Of macro-steps of a loop behind a server, since it began. */
+/** How a loop behind a server follows wall time. */
 export interface Lateness {
-  /** Simulated time over wall time. */
+  /** Simulated time over wall time of the last second; 0 at the start. */
   readonly factor: number;
-  readonly steps: number;
-  readonly misses: number;
-  /** [s] */
-  readonly worst: number;
   /** Wall time that was not simulated [s]. */
   readonly skipped: number;
 }
@@ -86,6 +82,8 @@ export interface Status {
 /** What the page holds (extensions/live/page.py). */
 export interface Setup {
   readonly controls: readonly string[];
+  /** One line on each control. */
+  readonly abouts: Readonly<Record<string, string>>;
   readonly refused: Readonly<Record<string, string>>;
   readonly gaits: readonly string[];
   readonly grounds: readonly { readonly name: string; readonly about: string }[];

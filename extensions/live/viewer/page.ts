@@ -98,7 +98,7 @@ function listenToPad(keys: Keys): void {
     const code = button.dataset.key!;
     button.addEventListener("pointerdown", (event) => {
       button.setPointerCapture(event.pointerId);
-      keys.hold(code);
+      keys.press(code);
     });
     for (const name of ["pointerup", "pointercancel", "lostpointercapture"] as const)
       button.addEventListener(name, () => keys.release(code));

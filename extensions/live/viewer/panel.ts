@@ -1,4 +1,5 @@
 import { byId, element } from "../../../cosim/viewer/src/dom";
+import { fixed } from "../../../cosim/viewer/src/panels/heading";
 import { bodyCommand, type Drive } from "./drive";
 import type { Connection, State } from "./link";
 import {
@@ -12,7 +13,7 @@ import {
 
 const SHOWN = 7000; // ms    that a note stays
 const SPAN = 0.33; // s    time constant of the speeds' means
-const SLOW = 0.98; // real-time factor below which it is marked
+const SLOW = 0.98; // real-time factor below which the computer is too slow
 const STATES: Record<State, string> = {
   connecting: "connecting",
   open: "live",
@@ -77,19 +78,14 @@ export class Panel {
     const [forward, , turn] = speedOf(frame);
     this.forward += weight * (forward - this.forward);
     this.turn += weight * (turn - this.turn);
-    text("speed-now", `${whole(1e3 * this.forward)} mm/s`);
-    text("turn-now", `${whole((180 / Math.PI) * this.turn)} °/s`);
+    text("speed-now", `${fixed(1e3 * this.forward, 0)} mm/s`);
+    text("turn-now", `${fixed((180 / Math.PI) * this.turn, 0)} °/s`);
   }
 
-  private showLateness({ factor, steps, misses, worst, skipped }: Lateness): void {
-    text("factor", `${factor.toFixed(2)} ×`);
-    byId("factor")?.parentElement?.classList.toggle("bad", factor < SLOW && steps > 400);
-    text("misses", String(misses));
-    const late = byId("misses")?.parentElement;
-    if (late)
-      late.title =
-        `${misses} of ${steps} macro-steps ended late, ` +
-        `the worst by ${(1e3 * worst).toFixed(1)} ms`;
+  private showLateness({ factor, skipped }: Lateness): void {
+    const slow = factor > 0 && factor < SLOW;
+    text("factor", slow ? `${factor.toFixed(2)} × real time` : "in real time");
+    byId("factor")?.parentElement?.classList.toggle("bad", slow);
     byId("gaps")?.toggleAttribute("hidden", skipped === 0);
     text("skipped", `${skipped.toFixed(1)} s`);
   }
@@ -128,6 +124,7 @@ export class Panel {
         button.setAttribute("aria-pressed", String(value === settings[key]));
         button.classList.toggle("coming", value === wanted[key] && value !== settings[key]);
       }
+    text("control-about", this.setup.abouts[settings.control] ?? "your own controller");
     const ground = byId<HTMLSelectElement>("ground");
     if (ground) ground.value = settings.ground;
     const friction = byId<HTMLInputElement>("friction");
@@ -187,11 +184,6 @@ function label(action: string, name: string, pressed: boolean): void {
   button?.setAttribute("aria-pressed", String(pressed));
   const place = button?.querySelector("span");
   if (place) place.textContent = name;
-}
-
-/** Returns a whole number without the sign of zero. */
-function whole(value: number): string {
-  return String(Math.round(value) + 0);
 }
 
 function text(id: string, content: string): void {

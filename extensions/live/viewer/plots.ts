@@ -1,5 +1,5 @@
 import uPlot from "uplot";
-import { element } from "../../../cosim/viewer/src/dom";
+import { fixed, type Labelled, makeFigure } from "../../../cosim/viewer/src/panels/heading";
 import { property, quietAxis } from "../../../cosim/viewer/src/theme";
 import { type Frame, footForces, speedOf } from "./messages";
 
@@ -8,9 +8,7 @@ const SLOWEST = 45; // ms    between two drawings
 const DEGREES = 180 / Math.PI;
 const LEGS = ["LF", "LM", "LR", "RF", "RM", "RR"];
 
-interface Curve {
-  readonly label: string;
-  readonly colour: string;
+interface Curve extends Labelled {
   value(frame: Frame): number;
 }
 
@@ -110,15 +108,8 @@ class Strip {
     private readonly about: Described,
     host: HTMLElement,
   ) {
-    const figure = element("figure", "panel");
-    const heading = element("figcaption", "panel-title");
-    const name = element("span", "panel-name", `${about.name} `);
-    name.append(element("span", "panel-unit", about.unit));
-    heading.append(name);
-    this.values = about.curves.map((curve) => readout(heading, curve));
-    const box = element("div", "panel-box");
-    figure.append(heading, box);
-    host.append(figure);
+    const { values, box } = makeFigure(host, about.name, about.unit, about.curves);
+    this.values = values;
     this.data = [[], ...about.curves.map(() => [])];
     this.plot = new uPlot(this.describe(), this.data as uPlot.AlignedData, box);
     new ResizeObserver(() => {
@@ -148,7 +139,7 @@ class Strip {
       this.plot.setScale("y", this.range());
     });
     this.values.forEach((value, k) => {
-      value.textContent = this.data[k + 1].at(-1)!.toFixed(this.about.digits);
+      value.textContent = fixed(this.data[k + 1].at(-1)!, this.about.digits);
     });
   }
 
@@ -184,15 +175,4 @@ class Strip {
       ],
     };
   }
-}
-
-/** Adds a curve's mark, label and value to a heading; returns the value's element. */
-function readout(heading: HTMLElement, curve: Curve): HTMLElement {
-  const item = element("span", "readout");
-  const mark = element("i", "mark");
-  mark.style.setProperty("--mark", `var(${curve.colour})`);
-  const value = element("span", "value", "0");
-  item.append(mark, curve.label, value);
-  heading.append(item);
-  return value;
 }

@@ -148,6 +148,14 @@ HX_API int hx_page_advance(int count, double vx, double vy, double yaw_rate, dou
   return HX_OK;
 }
 
+/* Makes a leg's servos limp, or healthy again. */
+HX_API int hx_page_leg(int leg) {
+  if (leg < 0 || leg >= HX_LEGS) return HX_INVALID_ARGUMENT;
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    input.strength[leg][joint] = 1.0 - input.strength[leg][joint];
+  return HX_OK;
+}
+
 /* Changes the control while the robot walks. */
 HX_API int hx_page_control(int next) { return hx_controller_change_control(controller, next); }
 

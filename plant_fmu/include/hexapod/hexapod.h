@@ -265,6 +265,11 @@ HX_API void hx_plant_indicators(const hxPlant *plant,
                                 hxIndicators *indicator); /* m  penetration +- 0.1 nm */
 HX_API int hx_plant_update_contacts(hxPlant *plant);      /* 1: bristles changed */
 
+/* Locks and releases joints as the input's `lock` says, which steps do at their start; returns
+ * whether one changed. A lock takes the joint's angle at that moment and holds it by stiff stops; a
+ * release loses the energy in them. */
+HX_API int hx_plant_update_locks(hxPlant *plant, const hxInput *input);
+
 /* Computes derivatives of rates and outputs along a direction of input and coordinates, with
  * contacts held. They are exact to rounding (complex step, lanes/complex_step.h); contact flags
  * and the solver's counters have derivative 0. Changes and results may be NULL. Returns

@@ -26,15 +26,16 @@ typedef struct {
 } hxMotor;
 
 /* What a motor gets from its supply: the voltage over servo.voltage, and this times the share of
- * the duty limit that heat leaves (eq. 52, 53). */
+ * the duty limit that heat leaves (eq. 52, 53); and the share of its limits that a fault leaves. */
 typedef struct {
-  hxReal supply, limit; /* 1 */
+  hxReal supply, limit, strength; /* 1 */
 } hxPower;
 
 /* Returns these of a joint's motor. */
 static inline hxPower hx_power_of(const hxCommand *command, int joint, int slot) {
   const hxReal supply = hx_splat(command->supply);
-  return (hxPower){supply, supply * hx_load(&command->duty[joint][slot])};
+  return (hxPower){supply, supply * hx_load(&command->duty[joint][slot]),
+                   hx_load(&command->strength[joint][slot])};
 }
 
 /* Returns the torque and the limits of a motor whose voltage is limited (eq. 48). The back-EMF
@@ -42,7 +43,7 @@ static inline hxPower hx_power_of(const hxCommand *command, int joint, int slot)
 static inline hxMotor voltage_motor(const hxModel *model, hxReal speed, hxReal wanted,
                                     hxPower power) {
   const hxReal brake = model->back_emf * speed, stall = model->stall_torque * power.limit;
-  const hxReal high = stall - brake, low = -stall - brake;
+  const hxReal high = power.strength * (stall - brake), low = power.strength * (-stall - brake);
   if (model->servo_mode != HX_SERVO_TORQUE) wanted = wanted * power.supply - brake;
   return (hxMotor){hx_clip(wanted, low, high), wanted, low, high, hx_splat(0.0)};
 }
@@ -56,8 +57,9 @@ static inline hxMotor hx_motor_torque(const hxModel *model, hxReal angle, hxReal
       model->kp * (angle_ref - angle) + model->kd * (speed_ref - speed) + torque_ref;
   if (model->servo_drive == HX_DRIVE_MOTOR) return voltage_motor(model, speed, wanted, power);
   const hxReal load = speed * (1.0 / model->speed_max);
-  const hxReal high = model->torque_max * hx_clip(1.0 - load, zero, one);
-  const hxReal low = -model->torque_max * hx_clip(1.0 + load, zero, one);
+  const hxReal most = model->torque_max * power.strength;
+  const hxReal high = most * hx_clip(1.0 - load, zero, one);
+  const hxReal low = -most * hx_clip(1.0 + load, zero, one);
   return (hxMotor){hx_clip(wanted, low, high), wanted, low, high, load};
 }
 
@@ -83,7 +85,7 @@ static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal
                                                                   : hx_splat(model->kp),
                              zero),
       .damping = hx_select(free, hx_splat(model->free_damping),
-                           hx_select(falling, hx_splat(model->limit_damping), zero)),
+                           hx_select(falling, model->limit_damping * power.strength, zero)),
       .drag = (model->coulomb_friction / model->gear_speed) * (1.0 - t * t),
   };
 }
@@ -210,18 +212,26 @@ typedef struct {
 /* Returns how far a joint is past its stops, rad: > 0 above angle_max, < 0 below angle_min. It is
  * measured from the middle between the stops, so that a joint may pass pi. */
 static inline hxReal hx_overrun(const hxModel *model, int joint, int slot, hxReal angle) {
-  const hxReal half = hx_load(&model->joint[joint].half_range[slot]);
-  const hxReal from_middle = within_turn(angle - hx_load(&model->joint[joint].middle[slot]));
+  const hxStops *stop = &model->joint[joint].stop;
+  const hxReal half = hx_load(&stop->half_range[slot]);
+  const hxReal from_middle = within_turn(angle - hx_load(&stop->middle[slot]));
   return from_middle - hx_clip(from_middle, -half, half);
+}
+
+/* Returns the energy that a joint's stops store, k x^2/2, J. */
+static inline hxReal hx_stop_energy(const hxModel *model, int joint, int slot, hxReal angle) {
+  const hxReal x = hx_overrun(model, joint, slot, angle);
+  return (0.5 * hx_load(&model->joint[joint].stop.stiffness[slot])) * (x * x);
 }
 
 /* Returns the torque of the stops, -(k x + c qd), the damper's part limited to the spring's, so
  * that a stop takes and releases a joint without a jump and does not pull (eq. 39). */
 static inline hxStop hx_stop_torque(const hxModel *model, int joint, int slot, hxReal angle,
                                     hxReal speed) {
-  const hxReal zero = hx_splat(0.0), k = hx_splat(model->stop_stiffness);
+  const hxReal zero = hx_splat(0.0), k = hx_load(&model->joint[joint].stop.stiffness[slot]),
+               c = hx_load(&model->joint[joint].stop.damping[slot]);
   const hxReal x = hx_overrun(model, joint, slot, angle);
-  const hxReal spring = k * x, limit = hx_abs(spring), wanted = model->stop_damping * speed;
+  const hxReal spring = k * x, limit = hx_abs(spring), wanted = c * speed;
   const hxReal damped = hx_clip(wanted, -limit, limit);
   const hxMask touches = hx_less(zero, limit), free = hx_less(hx_abs(wanted), limit);
   /* a limited damper doubles the spring on the way in and cancels it on the way out */
@@ -230,7 +240,7 @@ static inline hxStop hx_stop_torque(const hxModel *model, int joint, int slot, h
       .torque = -(spring + damped),
       .damped = damped,
       .stiffness = hx_select(touches, hx_select(free, k, limited), zero),
-      .damping = hx_select(free, hx_splat(model->stop_damping), zero),
+      .damping = hx_select(free, c, zero),
   };
 }
 

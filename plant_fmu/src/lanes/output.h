@@ -90,10 +90,8 @@ static hxNumber pair_elastic_energy(const hxWork *work) {
 /* Returns the energy k x^2/2 that the stops of a leg store, J. */
 static hxReal stop_energy(const hxModel *model, const hxLegWork *leg, int slot) {
   hxReal energy = hx_splat(0.0);
-  for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    const hxReal x = hx_overrun(model, joint, slot, leg->joint[joint].angle);
-    energy += (0.5 * model->stop_stiffness) * (x * x);
-  }
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    energy += hx_stop_energy(model, joint, slot, leg->joint[joint].angle);
   return energy;
 }
 

@@ -115,12 +115,6 @@ HX_RARE void add_pair_works(const hxPath *path, const hxImpulses *impulse, hxSte
     }
 }
 
-/* Returns the energy that a joint's stops store, J. */
-static inline hxReal stored_in_stop(const hxModel *model, int joint, int slot, hxReal angle) {
-  const hxReal x = hx_overrun(model, joint, slot, angle);
-  return (0.5 * model->stop_stiffness) * (x * x);
-}
-
 /* Adds what the stops of a pack of legs lose in a step: their work on the joints less what they
  * store. */
 HX_RARE void add_stop_works(const hxPath *path, const hxImpulses *impulse, int pack,
@@ -130,8 +124,8 @@ HX_RARE void add_stop_works(const hxPath *path, const hxImpulses *impulse, int p
     const hxReal speed = mean_of(&path->from->speed[joint][slot], &path->to->speed[joint][slot]);
     const hxReal before = hx_load(&path->from->angle[joint][slot]),
                  after = hx_load(&path->to->angle[joint][slot]);
-    const hxReal stored = stored_in_stop(path->model, joint, slot, after) -
-                          stored_in_stop(path->model, joint, slot, before);
+    const hxReal stored = hx_stop_energy(path->model, joint, slot, after) -
+                          hx_stop_energy(path->model, joint, slot, before);
     works->gear[pack] -= impulse->stop[joint][pack] * speed + stored;
   }
 }

@@ -118,6 +118,7 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   hx_copy_state(&plant->model, before, &plant->state);
   const int told = !ramp && (events->stop || before->call_input != 0.0);
   const hxStepCall call = {input, ramp, told ? input_fingerprint(input) : 0.0, before->time};
+  const int locks = hx_plant_update_locks(plant, input);
   hx_footprints_begin(&plant->footprints);
   events->footprints = &plant->footprints;
   events->feet = &plant->feet;
@@ -127,6 +128,7 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   } while (status == HX_OK && plant->state.time < t_end && !(events->stop && events->found));
   if (status == HX_OK) return HX_OK;
   hx_copy_state(&plant->model, &plant->state, before);
+  if (locks) hx_plant_derive_stops(plant);
   hx_footprints_take_back(&plant->footprints);
   return status;
 }

@@ -14,6 +14,9 @@ hxStatus hx_plant_fail(hxPlant *plant, hxStatus status, const char *text);
 /* Sets the model with the rows of feet alone, after every change of the model. */
 void hx_plant_derive_feet(hxPlant *plant);
 
+/* Sets the stops in force to those of the robot and of the state's locks. */
+void hx_plant_derive_stops(hxPlant *plant);
+
 /* Computes the command of an input at the present time. */
 void hx_plant_command(const hxPlant *plant, const hxInput *input, hxCommand *command);
 

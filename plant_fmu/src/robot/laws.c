@@ -89,7 +89,10 @@ static void compile_supply(hxModel *model, const hxDefinition *d) {
   model->bus_period = d->servo.bus_period, model->command_step = d->servo.command_step;
 }
 
-/* Computes the constants of the servos' motors, and of the joints' stops. */
+static const double lock_yield = 1e-3; /* rad  of a locked joint, under its motor's largest torque */
+static const double lock_time = 2e-3;  /* s    damping of a lock over its stiffness */
+
+/* Computes the constants of the servos' motors, and of the joints' stops and locks. */
 static void compile_servo(hxModel *model, const hxDefinition *d) {
   const int follows = d->servo.mode == HX_SERVO_POSITION, motor = d->servo.drive == HX_DRIVE_MOTOR;
   model->servo_mode = d->servo.mode, model->servo_drive = d->servo.drive;
@@ -106,7 +109,8 @@ static void compile_servo(hxModel *model, const hxDefinition *d) {
     if (follows) model->free_damping = model->kd + model->back_emf;
   }
   compile_supply(model, d);
-  model->stop_stiffness = d->servo.stop_stiffness, model->stop_damping = d->servo.stop_damping;
+  model->lock_stiffness = (motor ? model->stall_torque : model->torque_max) / lock_yield;
+  model->lock_damping = lock_time * model->lock_stiffness;
   model->stops = d->servo.mode != HX_SERVO_KINEMATIC && d->servo.stop_stiffness > 0.0;
 }
 

@@ -46,8 +46,11 @@ static void compile_joint(hxJointModel *m, const hxDefinition *d, int leg, int j
   for (int i = 0; i < 3; ++i)
     m->s_i[i][slot] = s_i[i], m->point_i[i][slot] = point_i[i], m->point_j[i][slot] = point_j[i];
   for (int i = 0; i < 4; ++i) m->zero[i][slot] = zero[i], m->frame[i][slot] = frame_j[i];
-  m->middle[slot] = 0.5 * (link->angle_min + link->angle_max);
-  m->half_range[slot] = 0.5 * (link->angle_max - link->angle_min);
+  m->own_stop.middle[slot] = 0.5 * (link->angle_min + link->angle_max);
+  m->own_stop.half_range[slot] = 0.5 * (link->angle_max - link->angle_min);
+  m->own_stop.stiffness[slot] = d->servo.stop_stiffness;
+  m->own_stop.damping[slot] = d->servo.stop_damping;
+  m->stop = m->own_stop;
 }
 
 /* Computes a point and the normal of the ground. */

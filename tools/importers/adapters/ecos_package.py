@@ -2,8 +2,7 @@
 
 usage: ecos_package.py PACKAGE.ssp NAMES.txt OUTPUTS.csv STEPS
 
-NAMES: component.variable, one on each line. Ecos needs the step size and the name of the parameter
-set.
+NAMES: component.variable, one on each line. Ecos needs the step size.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ from columns import write_columns
 from ecos_walk import EcosLib, EcosSimulation, read
 
 STEP = 0.005  # s
-PARAMETER_SET = "start"
 
 
 def main() -> None:
@@ -25,7 +23,7 @@ def main() -> None:
     names = Path(wanted).read_text(encoding="utf-8").split("\n")
     seen = []
     with EcosSimulation(step_size=STEP, ssp_path=package) as simulation:
-        simulation.init(parameter_set=PARAMETER_SET)
+        simulation.init()
         for _ in range(int(steps)):
             simulation.step()
             seen.append(

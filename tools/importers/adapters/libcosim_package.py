@@ -2,7 +2,7 @@
 
 usage: libcosim_package.py PACKAGE.ssp NAMES.txt OUTPUTS.csv STEPS
 
-NAMES: component.variable, one on each line. libcosim reads step size and parameter sets from the
+NAMES: component.variable, one on each line. libcosim reads the step size from the
 unpacked package.
 """
 

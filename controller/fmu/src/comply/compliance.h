@@ -5,15 +5,16 @@
 
 #include "../sense/burden.h"
 #include "../sense/contact_detection.h"
-#include "../sense/landing.h"
 #include "../sense/touchdown.h"
-#include "support.h"
+#include "../sense/trust.h"
+#include "load_plan.h"
 #include <string.h>
 
 typedef struct hxComplianceModel {
   hxParts parts;
   hxSensorWatchModel watch;
   hxBurdenModel burden;
+  hxTrustModel trust;
   double period; /* s */
   /* N, of the robot; a third of it; load of all feet from which on they have settled */
   double weight, share, settled;
@@ -21,32 +22,15 @@ typedef struct hxComplianceModel {
   double high;      /* m, a foot that is planned higher is in the air for certain */
   /* 1, factors of the smoothings over a period */
   double follow_load, follow_cycle, follow_weight;
-  int64_t calm; /* steps without sliding until feet are trusted again */
-  double most;  /* N m, limit of the torque */
+  double most; /* N m, limit of the torque */
 } hxComplianceModel;
-
-/* What a planned step requires of the laws. */
-typedef struct hxPlan {
-  double own[HX_LEGS][HX_JOINTS];   /* N m  torques for the legs' own weight and motion */
-  double carry[HX_LEGS][HX_JOINTS]; /* N m, torques for the planned load */
-  hxShares shares;
-  hxPlane feet[HX_LEGS];  /* m    contact points */
-  double weight;          /* N, sum of all shares */
-  int standing[HX_LEGS];  /* the leg carries its whole share */
-  int well_up[HX_LEGS];   /* the foot is in the air even if it meets the ground early */
-  double height[HX_LEGS]; /* m, of the paths above their ends */
-  double needed;          /* N m, largest element of carry */
-  int swinging[HX_LEGS];
-  int awaited[HX_LEGS];    /* the gait clock waits for the foot */
-  double falling[HX_LEGS]; /* m, by which feet well above the ground move down in a period */
-  int overspeed;           /* the plan exceeds the speed limit of some joint */
-} hxPlan;
 
 typedef struct hxCompliance {
   hxSensorWatch watch;
   hxTouchdown touchdown;
   hxLandings landings;
   hxBurden burden;
+  hxTrust trust;
   int touching[HX_LEGS];
   double load[HX_LEGS];              /* 1    smoothed, in thirds of the weight */
   double torque[HX_LEGS][HX_JOINTS]; /* N m, for the servos */
@@ -59,23 +43,10 @@ typedef struct hxCompliance {
   double scale;         /* 1    measured over planned weight */
   hxPlane lean;         /* m, of the measured centre of mass from the modelled one, walking frame */
   double held;          /* 1, share of the planned squeeze that the ground holds, smoothed */
-  double trust;         /* 1, below 1 while the robot slides or its joints cannot follow */
-  int lagging;          /* the joints cannot follow the plan */
-  double overspeed_share;   /* 1, share of the time in which the plan exceeds a speed limit */
-  int64_t slide_periods;    /* steps for which the robot has been sliding */
-  int64_t recovery_periods; /* steps that remain until feedback resumes after sliding */
 } hxCompliance;
 
-/* 1, common tangential over normal force beyond the plan, which only a sliding robot reaches */
-static const double sliding_drag = 0.55;
-/* 1, gait cycles without sliding until feet are trusted again */
-static const double calm_cycles = 0.5;
-static const double sliding_time = 0.04; /* s, longer than a foot skids at touch-down */
 /* 1, of the weight: feet that carry less in all have only just met the ground */
 static const double settled_share = 0.5;
-/* 1, share of the time in which joints would need more speed than a servo has */
-static const double joints_follow = 0.35, joints_do_not = 0.45;
-static const double feet_late = 0.2;   /* 1, the same, from which feet end their swings late */
 static const double gripped = 0.99;    /* 1, of its share: a leg that is given more carries it */
 static const double load_floor = 1e-6; /* N, a smaller sum of loads cannot be divided by */
 /* 1, measured over modelled weight, range that the support accepts */
@@ -112,51 +83,35 @@ static inline void hx_compliance_compile(const hxControllerDefinition *definitio
   model->most_lean = largest_lean * depth;
   hx_sensor_watch_compile(model->weight, cycle, period, &model->watch);
   hx_burden_compile(definition, &model->burden);
+  hx_trust_compile(definition, &model->trust);
   model->high = high_share * definition->gait.step_height;
   model->follow_load = 1.0 - hx_decay(-period / gains->support.load_time);
   model->follow_cycle = 1.0 - hx_decay(-period / cycle);
   model->follow_weight = 1.0 - hx_decay(-period / gains->support.weight_time);
-  const double calm = nearbyint(calm_cycles * cycle / period);
-  model->calm = (int64_t)calm;
   model->most = gains->limits.torque;
 }
 
 static inline void hx_compliance_reset(hxCompliance *laws) {
   memset(laws, 0, sizeof *laws);
-  laws->trust = laws->held = 1.0;
+  laws->trust.level = laws->held = 1.0;
   hx_landings_reset(&laws->landings);
   hx_burden_reset(&laws->burden);
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->grip[leg] = 1.0;
 }
 
-/* Sets what a step requires of the laws; height, rise: of the feet's paths above the stance [m,
- * m/s]. */
-static inline void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand,
-                                      const double height[HX_LEGS], const double rise[HX_LEGS],
-                                      hxPlan *plan) {
-  const double supports = model->parts.support ? 1.0 : 0.0;
-  plan->weight = plan->needed = 0.0;
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const double f[3] = {plan->shares.push[leg].x, plan->shares.push[leg].y,
-                         plan->shares.normal[leg]};
-    for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      const double *lever = demand->lever[leg][joint];
-      plan->own[leg][joint] = supports * demand->torque[leg][joint];
-      plan->carry[leg][joint] = -supports * (lever[0] * f[0] + lever[1] * f[1] + lever[2] * f[2]);
-      plan->needed = hx_larger(fabs(plan->carry[leg][joint]), plan->needed);
-    }
-    plan->weight += plan->shares.normal[leg];
-    plan->standing[leg] = plan->shares.activation[leg] >= 1.0;
-    plan->well_up[leg] = height[leg] > hx_early;
-    plan->height[leg] = height[leg];
-    plan->falling[leg] = plan->well_up[leg] ? hx_larger(-model->period * rise[leg], 0.0) : 0.0;
-  }
+/* Returns measured over modelled weight [1] (C32). */
+static inline double hx_compliance_heft(const hxCompliance *laws) { return laws->burden.heft; }
+
+/* Returns the torque needed for the measured weight over the torque allowed [1]. */
+static inline double hx_compliance_needed(const hxComplianceModel *model,
+                                          const hxCompliance *laws) {
+  return laws->burden.heft * laws->burden.peak / model->most;
 }
 
 /* ----------------------------------------------------------------------------------- contacts */
 
 /* Replaces the forces of sensors that are not trusted by the planned ones. */
-static inline void replace_forces(const hxPlan *plan, double force[HX_LEGS][3],
+static inline void replace_forces(const hxLoadPlan *plan, double force[HX_LEGS][3],
                                   hxCompliance *laws) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     if (!laws->doubted[leg]) continue;
@@ -169,7 +124,7 @@ static inline void replace_forces(const hxPlan *plan, double force[HX_LEGS][3],
 
 /* Decides which sensors are trusted (C34). When the sensors of three feet are not, none is. met:
  * heights at which the feet meet the ground without a bump [m]. */
-static inline void judge_sensors(const hxComplianceModel *model, const hxPlan *plan,
+static inline void judge_sensors(const hxComplianceModel *model, const hxLoadPlan *plan,
                                  const double met[HX_LEGS], double force[HX_LEGS][3],
                                  hxCompliance *laws) {
   int high[HX_LEGS], due[HX_LEGS], doubted = 0;
@@ -183,7 +138,7 @@ static inline void judge_sensors(const hxComplianceModel *model, const hxPlan *p
   for (int leg = 0; leg < HX_LEGS; ++leg) doubted += laws->watch.left[leg] > 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     laws->doubted[leg] = doubted >= HX_TRIPOD_LEGS || laws->watch.left[leg] > 0.0;
-    laws->fallback[leg] = laws->doubted[leg] || laws->trust < 1.0;
+    laws->fallback[leg] = laws->doubted[leg] || laws->trust.level < 1.0;
   }
   if (doubted) replace_forces(plan, force, laws);
 }
@@ -194,14 +149,14 @@ static inline int carries(const hxCompliance *laws, int leg) {
 }
 
 /* Adapts the paths to ground that is met early or late (C36). */
-static inline void meet_ground(const hxComplianceModel *model, const hxPlan *plan,
+static inline void meet_ground(const hxComplianceModel *model, const hxLoadPlan *plan,
                                const double met[HX_LEGS], hxCompliance *laws) {
   double falling[HX_LEGS];
   int early[HX_LEGS], searching[HX_LEGS];
   laws->regaining = 1;
   hx_landings_early(&laws->landings, met, plan->height, early);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    falling[leg] = early[leg] ? plan->falling[leg] : 0.0;
+    falling[leg] = early[leg] ? plan->descent[leg] : 0.0;
     searching[leg] = plan->awaited[leg] && !laws->doubted[leg] && !carries(laws, leg);
   }
   hx_touchdown_step(model->period, laws->touching, falling, plan->swinging, plan->standing,
@@ -209,51 +164,41 @@ static inline void meet_ground(const hxComplianceModel *model, const hxPlan *pla
 }
 
 /* Decides between a wrong sensor and ground that is met early or late. */
-static inline void examine_contacts(const hxComplianceModel *model, const hxPlan *plan,
+static inline void examine_contacts(const hxComplianceModel *model, const hxLoadPlan *plan,
                                     double force[HX_LEGS][3], hxCompliance *laws) {
   double met[HX_LEGS];
   hx_landings_expected(&laws->landings, laws->touching, plan->height, plan->swinging, met);
   if (model->parts.fallback) judge_sensors(model, plan, met, force, laws);
-  if (laws->trust < 1.0)
+  if (laws->trust.level < 1.0)
     memset(&laws->touchdown, 0, sizeof laws->touchdown);
   else if (model->parts.touchdown)
     meet_ground(model, plan, met, laws);
 }
 
 /* Returns whether contacts contradict the plan, or have done so and the reaction is in progress. */
-static inline int contacts_differ(const hxPlan *plan, const hxCompliance *laws) {
+static inline int contacts_differ(const hxLoadPlan *plan, const hxCompliance *laws) {
   int found = hx_sensor_watch_busy(&laws->watch) || hx_touchdown_busy(&laws->touchdown);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     found |= plan->awaited[leg] || (laws->touching[leg] != plan->standing[leg] &&
-                                    (plan->standing[leg] || plan->well_up[leg]));
+                                    (plan->standing[leg] || plan->height[leg] > hx_early));
   return found;
 }
 
 /* -------------------------------------------------------------------------- inputs and weight */
 
-/* Reduces the trust in the planned load while the robot slides, its joints cannot follow, or it is
- * far too heavy (C33). drag: the common tangential force of the feet beyond the plan, over the
- * normal force. */
-static inline void update_trust(const hxComplianceModel *model, const hxPlan *plan, double drag,
+/* Updates the trust and with it the legs without feedback (C33). drag: as for hx_trust_step. */
+static inline void update_trust(const hxComplianceModel *model, const hxLoadPlan *plan, double drag,
                                 hxCompliance *laws) {
-  laws->overspeed_share += model->follow_cycle * ((double)plan->overspeed - laws->overspeed_share);
-  laws->lagging = laws->overspeed_share > (laws->lagging ? joints_follow : joints_do_not);
-  laws->slide_periods = drag > sliding_drag ? laws->slide_periods + 1 : 0;
-  if ((double)laws->slide_periods * model->period > sliding_time)
-    laws->recovery_periods = model->calm;
-  else if (laws->recovery_periods)
-    --laws->recovery_periods;
-  const double goal =
-      laws->recovery_periods || laws->lagging || laws->burden.overburdened ? 0.0 : 1.0;
-  if (laws->trust == goal) return;
-  laws->trust += model->follow_load * (goal - laws->trust);
-  if (fabs(goal - laws->trust) < 1.0 - gripped) laws->trust = goal;
+  const double before = laws->trust.level,
+               goal = hx_trust_step(&model->trust, drag, plan->overspeed, laws->burden.overburdened,
+                                    &laws->trust);
+  if (before == goal) return;
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->fallback[leg] = laws->doubted[leg] || goal == 0.0;
 }
 
 /* Returns the share of the planned squeeze that creep has taken away, in [0, 1] (C46); 0 without
  * planned squeeze. deviation: of the tangential forces from the planned ones [N]. */
-static inline double squeeze_lost(const hxPlan *plan, const hxPlane deviation[HX_LEGS],
+static inline double squeeze_lost(const hxLoadPlan *plan, const hxPlane deviation[HX_LEGS],
                                   const hxCompliance *laws) {
   double whole = 0.0, present = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -268,7 +213,7 @@ static inline double squeeze_lost(const hxPlan *plan, const hxPlane deviation[HX
 /* Computes the normal forces and returns their sum [N]. Updates trust (C33), the smoothed loads
  * (C27) and the share of the planned squeeze that is held (C52) by the deviations of the tangential
  * forces (C24). */
-static inline double feel(const hxComplianceModel *model, const hxPlan *plan,
+static inline double feel(const hxComplianceModel *model, const hxLoadPlan *plan,
                           const double force[HX_LEGS][3], double normal[HX_LEGS],
                           hxCompliance *laws) {
   hxPlane common = {0.0, 0.0}, deviation[HX_LEGS];
@@ -294,7 +239,7 @@ static inline double feel(const hxComplianceModel *model, const hxPlan *plan,
 
 /* Updates the distance of the centre of mass from the modelled one (C44). The planned loads contain
  * the present distance. normal: measured [N]; total: their sum. */
-static inline void update_lean(const hxComplianceModel *model, const hxPlan *plan,
+static inline void update_lean(const hxComplianceModel *model, const hxLoadPlan *plan,
                                const double normal[HX_LEGS], double total, hxCompliance *laws) {
   hxPlane measured = {0.0, 0.0}, planned = {0.0, 0.0};
   if (!(total > model->settled) || !(plan->weight > model->settled)) return;
@@ -311,7 +256,7 @@ static inline void update_lean(const hxComplianceModel *model, const hxPlan *pla
 
 /* Updates the ratio of measured to planned weight (C30), the centre of mass (C44), and the part of
  * the weight that the servos carry. normal: measured normal forces [N]; total: their sum [N]. */
-static inline void update_weight(const hxComplianceModel *model, const hxPlan *plan,
+static inline void update_weight(const hxComplianceModel *model, const hxLoadPlan *plan,
                                  const double normal[HX_LEGS], double total, hxCompliance *laws) {
   const double ratio = total / hx_larger(plan->weight, load_floor),
                scale = hx_clamp(ratio, least_scale, largest_scale);
@@ -329,7 +274,7 @@ static inline void update_weight(const hxComplianceModel *model, const hxPlan *p
 
 /* Takes its share from a leg that does not touch the ground where it should stand, and gives it
  * back gradually once the leg touches (C28). */
-static inline void restore_grip(const hxComplianceModel *model, const hxPlan *plan,
+static inline void restore_grip(const hxComplianceModel *model, const hxLoadPlan *plan,
                                 hxCompliance *laws) {
   laws->regaining = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -341,7 +286,8 @@ static inline void restore_grip(const hxComplianceModel *model, const hxPlan *pl
 }
 
 /* Sets the torques of the planned load: trust (own + grip strength scale carry) (C29). */
-static inline void actuate(const hxComplianceModel *model, const hxPlan *plan, hxCompliance *laws) {
+static inline void actuate(const hxComplianceModel *model, const hxLoadPlan *plan,
+                           hxCompliance *laws) {
   const int limited = model->parts.limits;
   const double strength = limited ? laws->burden.strength : 1.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
@@ -350,7 +296,7 @@ static inline void actuate(const hxComplianceModel *model, const hxPlan *plan, h
   if (laws->regaining) restore_grip(model, plan, laws);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      const double torque = (laws->torque[leg][joint] + plan->own[leg][joint]) * laws->trust;
+      const double torque = (laws->torque[leg][joint] + plan->own[leg][joint]) * laws->trust.level;
       laws->torque[leg][joint] = limited ? hx_clamp(torque, -model->most, model->most) : torque;
     }
 }
@@ -364,7 +310,8 @@ static inline const double *hx_compliance_raised(const hxCompliance *laws, int *
 /* Returns whether a foot on its way down has met the ground, and not a sensor that lies (C51). */
 static inline int hx_compliance_meets(const hxComplianceModel *model, int leg,
                                       const hxCompliance *laws) {
-  return model->parts.touchdown && laws->trust == 1.0 && laws->touching[leg] && !laws->doubted[leg];
+  return model->parts.touchdown && laws->trust.level == 1.0 && laws->touching[leg] &&
+         !laws->doubted[leg];
 }
 
 /* Returns whether the gait clock waits for the feet of legs that end their swing (C50). held: it
@@ -372,7 +319,8 @@ static inline int hx_compliance_meets(const hxComplianceModel *model, int leg,
 static inline int hx_compliance_waits(const hxComplianceModel *model, const int landing[HX_LEGS],
                                       int held, const hxCompliance *laws) {
   int waits = 0;
-  if (!model->parts.touchdown || laws->trust < 1.0 || laws->overspeed_share > feet_late) return 0;
+  if (!model->parts.touchdown || laws->trust.level < 1.0 || hx_trust_feet_late(&laws->trust))
+    return 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const int found = held ? carries(laws, leg) : laws->touching[leg];
     waits |= landing[leg] && !found && !laws->doubted[leg] &&
@@ -383,7 +331,7 @@ static inline int hx_compliance_waits(const hxComplianceModel *model, const int 
 
 /* Advances the laws by one period. force: of the ground on the feet, walking frame [N]; replaced by
  * the planned one where a sensor is not trusted. */
-static inline void hx_compliance_step(const hxComplianceModel *model, const hxPlan *plan,
+static inline void hx_compliance_step(const hxComplianceModel *model, const hxLoadPlan *plan,
                                       double force[HX_LEGS][3], hxCompliance *laws) {
   double normal[HX_LEGS];
   for (int leg = 0; leg < HX_LEGS; ++leg) normal[leg] = force[leg][2];

@@ -4,18 +4,19 @@
 #define HX_COMPLIANT_H
 
 #include "../sense/load_adaptation.h"
+#include "../walk/gait_clock.h"
 #include "../walk/hold.h"
-#include "../walk/trajectory.h"
+#include "../walk/swing.h"
 #include "compliance.h"
 #include "planned_squeeze.h"
-#include "sway.h"
+#include "support.h"
 #include <string.h>
 
 typedef struct hxCompliantModel {
+  double period;     /* s */
   double per_second; /* 1/s   one over the period */
   double leading;    /* steps of the transition of the added velocity */
   hxInverseDynamics dynamics;
-  hxSway sway;
   hxSupport support;
   hxPlannedSqueeze squeeze;
   hxComplianceModel laws;
@@ -40,17 +41,17 @@ typedef struct hxCompliant {
   int moving;             /* the offsets have just changed */
 } hxCompliant;
 
-/* What a step requires, and its commands. */
-typedef struct hxStance {
-  hxPlan plan;
+/* Plan, command and geometry of the present step. */
+typedef struct hxPresentStep {
+  hxLoadPlan load;
   double climb[HX_LEGS][HX_JOINTS]; /* rad/m  of the joints as a foot rises */
   const double *value;              /* (6) commanded vx vy yaw_rate height roll pitch */
   const hxPosture *posture;
   const hxPlane *plane; /* m  (6) planned feet, walking frame */
-  hxPlane sway;         /* m, of the torso in the walking frame */
+  hxPlane torso;        /* m, its way in the walking frame */
   const double *height; /* m, (6) heights of the lowered feet */
   const double *rolled; /* m, (6) outwards from the stance to the positions that the feet aim at */
-} hxStance;
+} hxPresentStep;
 
 /* s, duration of the transition of the added velocity */
 static const double steering_time = 0.1;
@@ -86,6 +87,7 @@ static inline void hx_compliant_compile(const hxControllerDefinition *definition
   hxMasses masses;
   hxDemand rest;
   double foot[3];
+  model->period = definition->period;
   model->per_second = 1.0 / definition->period;
   model->leading = steering_time / definition->period;
   hx_inverse_dynamics_compile(definition, leg, &model->dynamics);
@@ -98,13 +100,15 @@ static inline void hx_compliant_compile(const hxControllerDefinition *definition
                             &level, &masses);
   const hxNeighbours motion = {{NULL, &masses, NULL}, {NULL, pose, NULL}};
   hx_inverse_dynamics_demand(&model->dynamics, leg, &motion, still, &level, 1.0, &rest);
-  hx_sway_compile(definition, leg, &model->dynamics, &model->sway);
   hx_support_compile(definition, &rest, &model->support);
   hx_compliance_compile(definition, -model->dynamics.floor, &model->laws);
   hx_planned_squeeze_compile(definition, model->laws.weight, -model->dynamics.floor,
                              &model->squeeze);
   hx_hold_compile(definition, &model->hold);
-  hx_load_adaptation_compile(definition, &model->adaptation);
+  const hxParts *parts = &definition->parts;
+  hx_load_adaptation_compile(definition, parts->support ? parts->squeeze : 0.0,
+                             parts->support && definition->gait.narrowing > 0.0,
+                             &model->adaptation);
 }
 
 static inline void hx_compliant_reset(const hxCompliantModel *model, hxCompliant *compliant) {
@@ -113,14 +117,31 @@ static inline void hx_compliant_reset(const hxCompliantModel *model, hxCompliant
   hx_load_adaptation_reset(&model->adaptation, &compliant->adaptation);
 }
 
-/* Computes the planned forces of the feet, walking frame (C19, C20, C42). The moment of the demand
- * becomes that about the measured centre of mass. */
-static inline void hx_compliant_shares(const hxCompliantModel *model, const hxCompliant *compliant,
-                                       const hxPlane feet[HX_LEGS], hxDemand *demand,
-                                       hxShares *shares) {
+/* Computes the planned loads of a step whose feet and contacts are set (C19, C20, C42). The moment
+ * of the demand becomes that about the measured centre of mass. height, rise: as for
+ * hx_plan_load. */
+static inline void hx_compliant_plan(const hxCompliantModel *model, const hxCompliant *compliant,
+                                     const double height[HX_LEGS], const double rise[HX_LEGS],
+                                     hxDemand *demand, hxLoadPlan *plan) {
   demand->moment = hx_plane_add(demand->moment, hx_scaled(compliant->laws.lean, demand->weight));
-  hx_support_shares(feet, demand, shares);
-  hx_planned_squeeze_add(&model->squeeze, feet, demand, compliant->adaptation.squeeze, shares);
+  hx_support_shares(plan->feet, demand, &plan->shares);
+  hx_planned_squeeze_add(&model->squeeze, plan->feet, demand, compliant->adaptation.squeeze,
+                         &plan->shares);
+  hx_plan_load(model->support.active, model->period, demand, height, rise, plan);
+}
+
+/* Computes the activations of the legs and the lowering of their feet [m] by the depth to which the
+ * ground will deform under their loads. phase: of the legs; plane: feet, walking frame [m]; clock:
+ * of the gait, in the section of the step. */
+static inline void hx_compliant_lowered(const hxCompliantModel *model, const hxGaitClock *clock,
+                                        const double phase[HX_LEGS], const hxPlane plane[HX_LEGS],
+                                        double activation[HX_LEGS], double lowering[HX_LEGS]) {
+  for (int k = 0; k < HX_LEGS; ++k)
+    activation[k] = clock->awaited[k]
+                        ? 0.0
+                        : hx_support_activation(&model->support, phase[k], clock->stayed[k],
+                                                clock->stays[k], clock->walking);
+  hx_support_lowering(&model->support, plane, activation, lowering);
 }
 
 /* ----------------------------------------------------------------------------------- steering */
@@ -157,7 +178,7 @@ static inline void hx_compliant_steer(const hxCompliantModel *model, int64_t ste
 
 /* Passes the measured positions of the standing feet to the slow loops. */
 static inline void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
-                        const hxStance *stance, const hxControllerInput *input,
+                        const hxPresentStep *present, const hxControllerInput *input,
                         hxCompliant *compliant) {
   const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
                z = input->quaternion[3];
@@ -168,21 +189,21 @@ static inline void look(const hxCompliantModel *model, const hxLegSolver leg[HX_
     hx_leg_solver_forward(&leg[k], angle, foot);
     seen.plane[k] = hx_plane(foot[0], foot[1]);
     seen.height[k] = foot[2];
-    hx_posture_turn(stance->posture, &seen.plane[k], &seen.height[k]);
-    const double rolls = hx_leg_solver_rolling(&leg[k], angle) - stance->rolled[k];
+    hx_posture_turn(present->posture, &seen.plane[k], &seen.height[k]);
+    const double rolls = hx_leg_solver_rolling(&leg[k], angle) - present->rolled[k];
     const hxPlane rolled = hx_scaled(hx_cis(leg[k].hip_yaw + angle[0]), rolls);
-    seen.plane[k] = hx_plane_add(hx_plane_sub(seen.plane[k], rolled), stance->sway);
-    seen.height[k] += stance->value[3];
-    seen.planned[k] = stance->plane[k];
-    seen.planned_height[k] = stance->height[k];
+    seen.plane[k] = hx_plane_add(hx_plane_sub(seen.plane[k], rolled), present->torso);
+    seen.height[k] += present->value[3];
+    seen.planned[k] = present->plane[k];
+    seen.planned_height[k] = present->height[k];
     seen.load[k] = compliant->laws.load[k];
   }
   const double rise = hx_clamp(2.0 * (w * y - z * x), -1.0, 1.0);
-  seen.tilt[0] = hx_arc(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)) - stance->value[4];
-  seen.tilt[1] = hx_arc(rise, sqrt((1.0 - rise) * (1.0 + rise))) - stance->value[5];
+  seen.tilt[0] = hx_arc(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)) - present->value[4];
+  seen.tilt[1] = hx_arc(rise, sqrt((1.0 - rise) * (1.0 + rise))) - present->value[5];
   seen.yaw = hx_arc(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
-  seen.velocity = hx_plane(stance->value[0], stance->value[1]);
-  seen.yaw_rate = stance->value[2];
+  seen.velocity = hx_plane(present->value[0], present->value[1]);
+  seen.yaw_rate = present->value[2];
   hx_hold_look(&model->hold, &seen, &compliant->hold);
 }
 
@@ -198,15 +219,15 @@ static inline void correct(const hxLegSolver *leg, const double climb[HX_JOINTS]
 
 /* Advances by one period: corrects the joint commands of this step in place (C41). */
 static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
-                                     const hxStance *stance, const hxControllerInput *input,
+                                     const hxPresentStep *present, const hxControllerInput *input,
                                      hxCompliant *compliant, hxControllerOutput *output) {
   hxCompliance *laws = &compliant->laws;
   double force[HX_LEGS][3];
-  hx_sense(input, stance->posture, force);
-  hx_compliance_step(&model->laws, &stance->plan, force, laws);
+  hx_sense(input, present->posture, force);
+  hx_compliance_step(&model->laws, &present->load, force, laws);
   if (compliant->count % model->hold.every == 0) {
-    if (laws->trust == 1.0)
-      look(model, leg, stance, input, compliant);
+    if (laws->trust.level == 1.0)
+      look(model, leg, present, input, compliant);
     else
       memset(&compliant->hold, 0, sizeof compliant->hold);
   }
@@ -215,11 +236,11 @@ static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegS
   const double *offsets = hx_compliance_raised(laws, &busy);
   for (int k = 0; k < HX_LEGS; ++k) {
     const double offset = offsets[k], raised = offset + compliant->hold.lift[k];
-    correct(&leg[k], stance->climb[k], raised, output->angle_ref[k]);
+    correct(&leg[k], present->climb[k], raised, output->angle_ref[k]);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       if (busy || compliant->moving)
         output->speed_ref[k][joint] +=
-            stance->climb[k][joint] * ((offset - compliant->offset[k]) * model->per_second);
+            present->climb[k][joint] * ((offset - compliant->offset[k]) * model->per_second);
       output->torque_ref[k][joint] = laws->torque[k][joint];
     }
     if (busy || compliant->moving) compliant->offset[k] = offset;
@@ -228,8 +249,8 @@ static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegS
     output->lift[k] = raised;
   }
   if (busy || compliant->moving) compliant->moving = busy;
-  const double needed = laws->burden.heft * laws->burden.peak / model->laws.most;
-  hx_load_adaptation_weigh(&model->adaptation, laws->burden.heft, &compliant->adaptation);
+  const double needed = hx_compliance_needed(&model->laws, laws);
+  hx_load_adaptation_weigh(&model->adaptation, hx_compliance_heft(laws), &compliant->adaptation);
   hx_load_adaptation_step(&model->adaptation, (const double (*)[HX_JOINTS])laws->torque, needed,
                           laws->held, &compliant->adaptation);
 }

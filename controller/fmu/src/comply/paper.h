@@ -5,7 +5,7 @@
 
 #include "../plane.h"
 #include "../walk/kinematics.h"
-#include "support.h"
+#include "shares.h"
 
 typedef struct hxPaperModel {
   double period;              /* s */

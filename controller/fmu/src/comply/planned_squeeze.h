@@ -3,7 +3,7 @@
 #ifndef HX_PLANNED_SQUEEZE_H
 #define HX_PLANNED_SQUEEZE_H
 
-#include "support.h"
+#include "shares.h"
 
 typedef struct hxPlannedSqueeze {
   double friction; /* 1, coefficient that is believed */
@@ -76,7 +76,7 @@ static inline void balance(const hxPlane arm[HX_LEGS], const double B[HX_LEGS][3
     needed[1] += change[k].y;
     needed[2] += hx_across(arm[k], change[k]);
   }
-  hx_support_solve(S, needed, x);
+  hx_shares_solve(S, needed, x);
   for (int k = 0; k < HX_LEGS; ++k) {
     change[k].x -= B[k][0] * x[0] + B[k][1] * x[1] + tx[k] * x[2];
     change[k].y -= B[k][1] * x[0] + B[k][2] * x[1] + ty[k] * x[2];

@@ -4,8 +4,11 @@
 #define HX_SUPPORT_H
 
 #include "../walk/inverse_dynamics.h"
+#include "shares.h"
+#include <string.h>
 
 typedef struct hxSupport {
+  int active;            /* the part is on: feet are lowered, and servos carry the load */
   double duty, handover; /* cycles; hand-overs of a leg never overlap, whatever the gait */
   double stiffness;      /* N/m^1.5 */
   double rest_weight;    /* N, that the robot requires in its stance */
@@ -13,27 +16,8 @@ typedef struct hxSupport {
   double rest_depth;     /* m, penetration of a foot in the stance */
 } hxSupport;
 
-/* Planned forces of the ground on the feet at one step, walking frame. */
-typedef struct hxShares {
-  double activation[HX_LEGS]; /* 1  in [0, 1] */
-  double normal[HX_LEGS];     /* N */
-  hxPlane push[HX_LEGS];      /* N */
-  hxPlane squeeze[HX_LEGS];   /* N, the part of push by which the legs squeeze each other (C42) */
-} hxShares;
-
-/* 1, of the mean square arm: feet on one line share no moment about it */
-static const double ridge_share = 1e-9;
-/* m2, makes the equations solvable when no foot stands */
-static const double least_arm = 1e-12;
 /* m2, of the feet about their centre: feet that are closer take no moment about the vertical */
 static const double least_spread = 1e-4;
-static const double least_load = 1e-6; /* N, a smaller load is not shared */
-
-/* Returns the depth [m] by which the ground deforms under a load [N] (C21). */
-/* Returns the indentation [m] of the ground under a load [N], (f_n/K)^(2/3) (C21). */
-static inline double hx_indentation(double load, double stiffness) {
-  return hx_two_thirds(load / stiffness);
-}
 
 /* Returns a transition from 0 to 1 over [0, 1] with continuous rate and acceleration. */
 static inline double smooth(double x) {
@@ -41,23 +25,11 @@ static inline double smooth(double x) {
   return y * y * y * (10.0 + y * (6.0 * y - 15.0));
 }
 
-/* Solves S x = b for symmetric, positive semidefinite S (00 01 02 11 12 22) by L D L^T; a ridge on
- * the diagonal makes S definite. */
-static inline void hx_support_solve(const double S[6], const double b[3], double x[3]) {
-  const double ridge = ridge_share * (S[0] + S[3] + S[5]) + least_arm;
-  const double d0 = S[0] + ridge, l10 = S[1] / d0, l20 = S[2] / d0;
-  const double d1 = S[3] + ridge - l10 * S[1], l21 = (S[4] - l20 * S[1]) / d1;
-  const double d2 = S[5] + ridge - l20 * S[2] - l21 * l21 * d1;
-  const double y1 = b[1] - l10 * b[0], y2 = b[2] - l20 * b[0] - l21 * y1;
-  x[2] = y2 / d2;
-  x[1] = y1 / d1 - l21 * x[2];
-  x[0] = b[0] / d0 - l10 * x[1] - l20 * x[2];
-}
-
 static inline void hx_support_compile(const hxControllerDefinition *definition,
                                       const hxDemand *rest, hxSupport *model) {
   const hxGait *gait = &definition->gait;
   const double handover = definition->gains.support.handover_time / gait->period;
+  model->active = definition->parts.support;
   model->duty = gait->duty;
   model->handover = hx_smaller(handover, hx_smaller(gait->duty, 1.0 - gait->duty));
   model->stiffness = definition->contact_stiffness;
@@ -94,7 +66,7 @@ static inline void share_normal(const hxPlane feet[HX_LEGS], const double activa
     S[4] += ax * feet[k].y;
     S[5] += ay * feet[k].y;
   }
-  hx_support_solve(S, needed, x);
+  hx_shares_solve(S, needed, x);
   for (int k = 0; k < HX_LEGS; ++k) {
     const double share = activation[k] * (x[0] + x[1] * feet[k].x + x[2] * feet[k].y);
     normal[k] = share < 0.0 ? 0.0 : share;
@@ -106,6 +78,8 @@ static inline void share_normal(const hxPlane feet[HX_LEGS], const double activa
 static inline void hx_support_lowering(const hxSupport *model, const hxPlane feet[HX_LEGS],
                                        const double activation[HX_LEGS], double lowering[HX_LEGS]) {
   double normal[HX_LEGS];
+  memset(lowering, 0, sizeof normal);
+  if (!model->active) return;
   share_normal(feet, activation, model->rest_weight, model->rest_moment, normal);
   for (int k = 0; k < HX_LEGS; ++k)
     lowering[k] = hx_indentation(normal[k], model->stiffness) - model->rest_depth;

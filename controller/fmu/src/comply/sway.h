@@ -2,9 +2,8 @@
 #ifndef HX_SWAY_H
 #define HX_SWAY_H
 
-#include "../sense/load_adaptation.h"
+#include "../walk/foot_paths.h"
 #include "../walk/inverse_dynamics.h"
-#include "../walk/trajectory.h"
 
 typedef struct hxSway {
   int active;            /* the part is on */
@@ -66,45 +65,36 @@ static inline void hx_sway_compile(const hxControllerDefinition *definition,
   model->rest = moment_of(dynamics, leg, hx_plane(0.0, 0.0));
 }
 
-/* Returns whether the torso sways. */
-static inline int hx_sway_acts(const hxSway *model, const hxLoadAdaptation *adaptation) {
-  return model->active && adaptation->narrowing > 0.0;
+/* Returns whether the torso sways. narrowing: part of the way to the narrow stance [1]. */
+static inline int hx_sway_acts(const hxSway *model, double narrowing) {
+  return model->active && narrowing > 0.0;
 }
 
-/* Returns the weight that sways over the modelled one [1]. */
-static inline double hx_sway_laden(const hxSway *model, const hxLoadAdaptation *adaptation) {
-  return model->active ? hx_load_adaptation_laden(adaptation) : 1.0;
-}
-
-/* Returns the way of the torso that gives the robot another sum of m p [kg m]. */
-static inline hxPlane yield_to(const hxSway *model, hxPlane moment,
-                               const hxLoadAdaptation *adaptation) {
-  const double laden = hx_load_adaptation_laden(adaptation);
+/* Returns the way of the torso that gives the robot another sum of m p [kg m]. laden: measured over
+ * modelled weight [1]. */
+static inline hxPlane yield_to(const hxSway *model, hxPlane moment, double laden) {
   return hx_plane(moment.x / (model->mass * (laden - model->forward)),
                   moment.y / (model->mass * (laden - model->aside)));
 }
 
 /* Returns nearly the whole way of the torso in the walking frame, by the shares [m]. */
-static inline hxPlane hx_sway_guess(const hxSway *model, const hxPlannedFeet *feet,
-                                    const hxLoadAdaptation *adaptation) {
+static inline hxPlane hx_sway_guess(const hxSway *model, const hxPlannedFeet *feet, double laden) {
   const double mass = model->mass / HX_LEGS;
   hxPlane away = hx_scaled(model->home, -1.0);
   for (int k = 0; k < HX_LEGS; ++k) away = hx_plane_add(away, feet->plane[k]);
   away = hx_plane(model->forward * mass * away.x, model->aside * mass * away.y);
-  return hx_scaled(yield_to(model, away, adaptation), -1.0);
+  return hx_scaled(yield_to(model, away, laden), -1.0);
 }
 
 /* Returns the way of the torso in the walking frame [m] (C54). masses: of a torso that has moved by
  * the guess. */
 static inline hxPlane hx_sway_of(const hxSway *model, const hxInverseDynamics *dynamics,
-                                 hxPlane guess, const hxMasses *masses,
-                                 const hxLoadAdaptation *adaptation) {
-  hxPlane moved = hx_plane_sub(hx_scaled(guess, hx_load_adaptation_laden(adaptation) * model->mass),
-                               model->rest);
+                                 hxPlane guess, const hxMasses *masses, double laden) {
+  hxPlane moved = hx_plane_sub(hx_scaled(guess, laden * model->mass), model->rest);
   for (int k = 0; k < HX_LEGS; ++k)
     for (int link = 0; link < HX_JOINTS; ++link)
       moved = hx_plane_add(moved, hx_scaled(masses->place[k][link], dynamics->mass[k][link]));
-  return hx_scaled(hx_plane_sub(guess, yield_to(model, moved, adaptation)), adaptation->narrowing);
+  return hx_plane_sub(guess, yield_to(model, moved, laden));
 }
 
 #endif

@@ -37,13 +37,15 @@ static const double modelled = 1.1, heavy = 1.2; /* 1, measured over modelled we
 /* 1, of the set weight of the squeeze, in the narrow stance */
 static const double spared = 0.75;
 
+/* squeeze: weight on ground on which feet creep, while all servos are cool, 0 for none [1];
+ * narrows: the gait has a narrow stance. */
 static inline void hx_load_adaptation_compile(const hxControllerDefinition *definition,
+                                              double squeeze, int narrows,
                                               hxLoadAdaptationModel *model) {
-  const double rating = definition->servo.torque_continuous,
-               squeeze = definition->parts.support ? definition->parts.squeeze : 0.0;
+  const double rating = definition->servo.torque_continuous;
   model->rating = rating * rating;
   model->squeeze = squeeze;
-  model->narrows = definition->parts.support && definition->gait.narrowing > 0.0;
+  model->narrows = narrows;
   model->follow_work = 1.0 - hx_decay(-definition->period / definition->gait.period);
   model->follow = 1.0 - hx_decay(-definition->period / heat_time);
 }

@@ -24,12 +24,11 @@ extern "C" {
 typedef struct hxMaster {
   hxStepper stepper;
   hxSensors feet, joints, torso;
-  hxServos servos;
   const double *time;    /* s     [steps + 1] */
   const double *command; /*       [steps][command_count] */
-  const double *push;    /* N, N m  [steps][push_count]; NULL: none */
+  const double *push; /* [steps][push_count] pushes, before them faults of servos; NULL: none */
   size_t push_count;
-  size_t push_place;
+  size_t push_place; /* 1     index in the row */
   const uint8_t *lost; /* 1     [steps] whether the plant keeps its last joint commands; NULL: no */
   size_t drive_place;  /* 1     index of the first joint command in the row */
   size_t drive_count;  /* 1     joint commands */
@@ -43,7 +42,7 @@ typedef struct hxMaster {
 
 /* Number of the layout of hxMaster and of the structures in it. A change of their members, or of
  * what a member means, increases it. */
-#define HX_MASTER_LAYOUT 3
+#define HX_MASTER_LAYOUT 4
 
 /* Layout and size of hxMaster in this library, with which callers check their own. */
 HX_API int hx_master_layout(void);

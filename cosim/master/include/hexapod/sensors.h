@@ -1,4 +1,4 @@
-/* sensors.h - errors of sensors and servos, which lie between the plant and the controller. Both
+/* sensors.h - errors of sensors, which lie between the plant and the controller. Both
  * loops, in C and in Python, call them (cosim/master/sensors.py).
  *
  * Values are in the row of a macro-step (macro_step.h); "moment" counts macro-steps from 0. */
@@ -14,11 +14,11 @@
 extern "C" {
 #endif
 
-/* Faults of a sensor; the first three also those of a servo. */
+/* Faults of a sensor. */
 typedef enum hxFault {
   HX_FAULT_NONE,
-  HX_FAULT_DEAD,  /* reads what a sensor without a signal reads; a servo without torque */
-  HX_FAULT_STUCK, /* repeats its last reading; a servo that stays where it is */
+  HX_FAULT_DEAD,  /* reads what a sensor without a signal reads */
+  HX_FAULT_STUCK, /* repeats its last reading */
   HX_FAULT_NAN,   /* reads no numbers */
   HX_FAULT_LATE   /* reads what was true some macro-steps ago */
 } hxFault;
@@ -43,23 +43,6 @@ typedef struct hxSensors {
 
 /* Computes the readings of a moment from the true numbers. */
 HX_API void hx_sensors_read(const hxSensors *sensors, size_t moment, double *row);
-
-/* Faults of servos, which know the true angles. */
-typedef struct hxServos {
-  size_t count;        /* 1     servos; 0: none have faults */
-  const int8_t *fault; /* 1     [moments][count] hxFault */
-  size_t moments;      /* 1     after them there are no faults */
-  const size_t *angle; /* 1     [count] indices of joint angles and speeds in the row */
-  const size_t *speed;
-  const size_t *angle_ref; /* 1     [count] indices of the joint commands in the row */
-  const size_t *speed_ref;
-  const size_t *torque_ref;
-  const size_t *acceleration_ref;
-  double *stuck_at; /* rad   [count] where a servo stuck; NaN: it does not */
-} hxServos;
-
-/* Replaces the joint commands of servos with faults. */
-HX_API void hx_servos_break(const hxServos *servos, size_t moment, double *row);
 
 #ifdef __cplusplus
 }

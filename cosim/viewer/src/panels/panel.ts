@@ -2,6 +2,7 @@ import uPlot from "uplot";
 import type { Clock } from "../clock";
 import { element } from "../dom";
 import { property, quietAxis } from "../theme";
+import { fixed, type Labelled, makeFigure } from "./heading";
 
 /** The interval of time that a group of plots shows; it moves on with the replay, page by page. */
 export class Span {
@@ -32,12 +33,6 @@ export class Span {
     this.show(time > this.high ? time - 0.1 * this.width : time - 0.5 * this.width, this.width);
   }
 
-  /** Makes the interval wider (factor above 1) or narrower; `about` is the fixed time. */
-  zoom(factor: number, about: number): void {
-    const width = Math.min(Math.max(this.width * factor, 0.02), this.end - this.start);
-    this.show(about - ((about - this.low) / (this.high - this.low)) * width, width);
-  }
-
   show(low: number, width: number): void {
     const whole = this.end - this.start;
     this.width = Math.min(width, whole);
@@ -49,11 +44,7 @@ export class Span {
 
 const LEAST = 1e-4; // relative: a curve with a smaller range is a constant with round-off
 
-export interface Curve {
-  readonly label: string;
-  /** Name of the page's custom property that holds the colour. */
-  readonly colour: string;
-  readonly dash?: readonly number[];
+export interface Curve extends Labelled {
   readonly time: ArrayLike<number>;
   readonly values: ArrayLike<number>;
   /** Returns the value at a time, for the heading. */
@@ -81,17 +72,10 @@ export class Panel {
     private readonly clock: Clock,
     private readonly span: Span,
   ) {
-    const figure = element("figure", "panel");
-    const heading = element("figcaption", "panel-title");
-    this.readouts = options.curves.map((curve) => readout(curve));
-    const values = element("div", "readouts"); // which wrap into a row of their own together
-    values.append(...this.readouts.map((value) => value.parentElement!));
-    heading.append(titleOf(options), values);
-    figure.append(heading);
-    options.host.append(figure);
-    const box = element("div", "panel-box");
-    figure.append(box);
-    this.plot = new uPlot(this.describe(box), dataOf(options.curves), box);
+    const { host, title, unit, curves } = options;
+    const { values, box } = makeFigure(host, title, unit, curves);
+    this.readouts = values;
+    this.plot = new uPlot(this.describe(box), dataOf(curves), box);
     this.plot.over.append(this.playhead);
     this.listenToPointer();
     new ResizeObserver(() => this.resize(box)).observe(box);
@@ -123,13 +107,7 @@ export class Panel {
       },
       axes: [
         { ...quiet, size: 22, gap: 3, space: 60 },
-        {
-          ...quiet,
-          size: 46,
-          gap: 4,
-          space: 26,
-          values: (_, splits, __, ___, step) => splits.map((value) => tick(value, step)),
-        },
+        { ...quiet, size: 46, gap: 4, space: 26 },
       ],
       series: [{}, ...this.options.curves.map(seriesOf)],
       hooks: { ready: [again], setScale: [again], setSize: [again] },
@@ -170,32 +148,7 @@ export class Panel {
     over.addEventListener("pointermove", (event) => {
       if (over.hasPointerCapture(event.pointerId)) this.clock.seek(timeOf(event));
     });
-    over.addEventListener(
-      "wheel",
-      (event) => {
-        if (!(event.ctrlKey || event.metaKey)) return;
-        event.preventDefault();
-        this.span.zoom(event.deltaY > 0 ? 1.25 : 0.8, timeOf(event));
-      },
-      { passive: false },
-    );
   }
-}
-
-function titleOf(options: PanelOptions): HTMLElement {
-  const title = element("span", "panel-name", options.title);
-  title.append(element("span", "panel-unit", ` ${options.unit}`));
-  return title;
-}
-
-/** Returns the element of a curve's value, beside which its mark and label stand. */
-function readout(curve: Curve): HTMLElement {
-  const item = element("span", "readout");
-  const mark = element("i", curve.dash ? "mark dashed" : "mark");
-  mark.style.setProperty("--mark", `var(${curve.colour})`);
-  const value = element("b", "value");
-  item.append(mark, element("span", "curve-name", curve.label), value);
-  return value;
 }
 
 function seriesOf(curve: Curve): uPlot.Series {
@@ -208,20 +161,11 @@ function seriesOf(curve: Curve): uPlot.Series {
   };
 }
 
-/** Returns curves that share their times as they are, and joins others. */
+/** Returns the curves at the times of all of them. */
 function dataOf(curves: readonly Curve[]): uPlot.AlignedData {
-  const time = curves[0].time;
-  if (curves.every((curve) => sameTimes(curve.time, time)))
-    return [time, ...curves.map((curve) => curve.values)] as uPlot.AlignedData;
   return uPlot.join(
     curves.map((curve) => [Array.from(curve.time), Array.from(curve.values)] as uPlot.AlignedData),
   );
-}
-
-function sameTimes(a: ArrayLike<number>, b: ArrayLike<number>): boolean {
-  if (a === b) return true;
-  for (let k = 0; k < a.length; k++) if (a[k] !== b[k]) return false;
-  return a.length === b.length;
 }
 
 /** Returns limits with a margin above and below, also for a constant. */
@@ -234,21 +178,10 @@ function roomy(from: number, to: number): uPlot.Range.MinMax {
   return [from >= 0 && from < 0.3 * (to - from) ? 0 : from - margin, to + margin];
 }
 
-/** Returns a value of an axis as text with as many digits as the step between values needs. */
-function tick(value: number, step: number): string {
-  const digits = Math.min(Math.max(-Math.floor(Math.log10(step) + 1e-9), 0), 6);
-  return minus((value + 0).toFixed(digits));
-}
-
-/** Returns a number's text with a true minus sign, and zero without any. */
-function minus(text: string): string {
-  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
-}
-
 /** Returns a value as text with about three digits. */
 function figures(value: number): string {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
   const digits = size >= 100 ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : 3;
-  return minus(value.toFixed(digits));
+  return fixed(value, digits);
 }

@@ -44,8 +44,13 @@ export class RobotScene extends Scene {
   }
 
   /** Shows a pose, forces on the feet [body weights], and the lamp above a place. */
-  show(pose: Pose, touching: readonly boolean[], forces: readonly Vector3[], place: Vector3): void {
-    this.model.place(pose, touching);
+  show(
+    pose: Pose,
+    inContact: readonly boolean[],
+    forces: readonly Vector3[],
+    place: Vector3,
+  ): void {
+    this.model.place(pose, inContact);
     const soles = footCentres(this.robot, pose).map((foot) =>
       foot.addScaledVector(this.relief.normal(foot.x, foot.y), -this.robot.foot),
     );

@@ -12,7 +12,7 @@ export class Stage {
   private readonly renderer: WebGLRenderer;
   private readonly eye: Eye;
   private stale = true;
-  private warm = false;
+  private compiled = false;
 
   /** Throws when the browser has no WebGL. */
   constructor(
@@ -40,12 +40,10 @@ export class Stage {
    * before.
    */
   async prepare(): Promise<void> {
-    const aside = this.renderer.extensions.has("KHR_parallel_shader_compile");
-    if (aside)
-      await Promise.all(
-        this.actors.map((actor) => this.renderer.compileAsync(actor.scene, this.eye.view)),
-      );
-    this.warm = true;
+    await Promise.all(
+      this.actors.map((actor) => this.renderer.compileAsync(actor.scene, this.eye.view)),
+    );
+    this.compiled = true;
     this.stale = true;
   }
 
@@ -57,7 +55,7 @@ export class Stage {
 
   /** Draws the views if anything has changed. */
   render(): void {
-    if (!this.stale || !this.warm) return;
+    if (!this.stale || !this.compiled) return;
     this.stale = false;
     const { width, height, columns, rows } = this.layout();
     const [w, h] = [width / columns, height / rows];

@@ -1,5 +1,5 @@
 import { Vector3 } from "three";
-import { inflate } from "../recording";
+import { unpack } from "../recording";
 import type { Ground, Material, PackedSurface } from "../types";
 
 /** Height [m] of a smooth surface and its slopes along x and y. */
@@ -29,7 +29,8 @@ export class Surface {
     readonly material: Uint8Array,
   ) {
     this.smooth = packed.kind === "smooth";
-    ({ rows: this.rows, columns: this.columns, materials: this.materials } = packed);
+    ({ across: this.columns, materials: this.materials } = packed);
+    this.rows = packed.rows / packed.across;
     ({ x0: this.x0, y0: this.y0, cell: this.cell } = packed);
   }
 
@@ -83,16 +84,9 @@ export function clamp(value: number, low: number, high: number): number {
 
 /** Unpacks what cosim/report/geometry.py has packed. */
 export async function unpackSurface(packed: PackedSurface): Promise<Surface> {
-  const { rows, columns } = packed;
-  const size = rows * columns;
-  const planes = await inflate(packed.data);
-  const steps = new Uint16Array(size);
-  for (let k = 0; k < size; k++) steps[k] = planes[k] + 256 * planes[size + k];
-  for (let k = 0; k < size; k++) if (k % columns > 0) steps[k] += steps[k - 1];
-  for (let k = columns; k < size; k++) steps[k] += steps[k - columns];
-  const height = Float32Array.from(steps, (step) => packed.low + packed.step * step);
-  const material = packed.material ? await inflate(packed.material) : new Uint8Array();
-  return new Surface(packed, height, material);
+  const grid = await unpack(packed);
+  const material = grid.has("material") ? grid.column("material").map(Math.round) : [];
+  return new Surface(packed, grid.column("height"), Uint8Array.from(material));
 }
 
 /** The ground of a run, a plane or a surface: its height and normal at each position. */

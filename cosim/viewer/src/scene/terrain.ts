@@ -109,12 +109,6 @@ export class Terrain extends Group {
     this.material.onBeforeCompile = (shader) => this.extend(shader);
   }
 
-  /** Returns the number of triangles. */
-  get triangles(): number {
-    const mesh = this.children[0] as Mesh;
-    return (mesh.geometry.index?.count ?? 0) / 3;
-  }
-
   paint(colours: Colours): void {
     this.material.color.copy(colours.floor);
     this.edge.color.copy(colours.edge);
@@ -146,7 +140,7 @@ export class Terrain extends Group {
 }
 
 /** Returns the distance of contours [m]: 1, 2 or 5 times a power of ten; 0 without contours. */
-export function contourDistance(surface: Surface): number {
+function contourDistance(surface: Surface): number {
   const [low, high] = surface.range;
   if (!surface.smooth || high - low < LEAST_RANGE) return 0;
   const wished = (high - low) / CONTOURS;

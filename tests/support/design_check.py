@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,9 +14,8 @@ from hexapod_cosim.controller.design.paper import closed_loop, delay_steps, law_
 from hexapod_cosim.controller.design.standing import StandingPlant
 from hexapod_cosim.controller.size import size_of
 from hexapod_cosim.cosim.design.gains import STANCES, level_fmu
-from hexapod_cosim.cosim.design.linearise import ANGLES, Bench, Motion, linearise
-from hexapod_cosim.cosim.design.standing import StanceError, rest
-from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.design.linearise import ANGLES, Bench, linearise
+from hexapod_cosim.cosim.design.standing import rest
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.records import Array
 
@@ -69,7 +67,7 @@ def check_design(
     robot: Robot,
     gains: Gains,
     *,
-    stance: str | None = None,
+    stance: str = "six legs",
     load: float = 1.0,
     gears_stick: bool = True,
     push: Array | None = None,
@@ -77,14 +75,13 @@ def check_design(
 ) -> DesignCheck:
     """Simulates how the law of the paper's control answers to feet that are shifted.
 
-    It runs on the FMU and in the linear closed loop. stance: by default the first in which the
-    robot stands; load: mean of the standing legs, in thirds of the weight; gears_stick: with the
-    dry friction of the gears; push: shifts (3 n) of the standing feet of unit length, by default
-    those that spread them; spread: their size [m].
+    It runs on the FMU and in the linear closed loop. load: mean of the standing legs, in thirds of
+    the weight; gears_stick: with the dry friction of the gears; push: shifts (3 n) of the standing
+    feet of unit length, by default those that spread them; spread: their size [m].
     """
     period, friction = gains.period, robot.servo.coulomb_friction if gears_stick else 0.0
     with level_fmu(robot) as fmu:
-        motion, inputs = _rest(fmu, robot, stance, load)
+        motion, inputs = rest(fmu, robot, standing=STANCES[stance], load=load)
         plant = linearise(fmu, robot, motion, inputs, period=period, coulomb_friction=friction)
         push = splay(robot, plant) if push is None else push
         delays = delay_steps(gains.requirements, period=period)
@@ -101,15 +98,6 @@ def check_design(
         simulated = _run(bench, FeetLaw(robot, plant, gains), inputs, disturbance)
     seen = (simulated - simulated[0]) @ push / -spread
     return DesignCheck(time=time, predicted=-push @ forces, simulated=seen)
-
-
-def _rest(fmu: Fmu, robot: Robot, stance: str | None, load: float) -> tuple[Motion, Array]:
-    """Returns the robot at rest in a stance, or in the first possible one. Raises StanceError."""
-    *others, last = STANCES if stance is None else [stance]
-    for name in others:
-        with suppress(StanceError):
-            return rest(fmu, robot, standing=STANCES[name], load=load)
-    return rest(fmu, robot, standing=STANCES[last], load=load)
 
 
 def _run(bench: Bench, law: FeetLaw, inputs: Array, disturbance: Array) -> Array:

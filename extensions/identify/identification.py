@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +13,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.interface.names import vector_names
-from hexapod_cosim.cosim.run.worker_pool import WorkerPool, processor_count
-from hexapod_cosim.extensions.identify.command_screening import wrong_commands, wrong_commands_error
-from hexapod_cosim.extensions.identify.experiment import Experiment, open_plant
+from hexapod_cosim.extensions.identify.experiment import Experiment
 from hexapod_cosim.extensions.identify.fitting.judging import Fit, fit
 from hexapod_cosim.extensions.identify.fitting.misfit import DETERMINED
 from hexapod_cosim.extensions.identify.fitting.problem import Problem
@@ -29,9 +24,8 @@ from hexapod_cosim.extensions.identify.log import (
     with_speed_references,
     without_readings,
 )
-from hexapod_cosim.extensions.identify.log_plant import LogPlant
 from hexapod_cosim.extensions.identify.numbers import Unknown
-from hexapod_cosim.extensions.identify.numbers.servo import ELASTIC
+from hexapod_cosim.extensions.identify.plant import LogPlant
 from hexapod_cosim.extensions.identify.report import (
     Difference,
     channel_differences,
@@ -60,7 +54,6 @@ class Estimate:
     high: float
     deviation: float  # over that of what was known before: 1 where the logs say nothing
     alone: bool = True  # whether the logs determine it without numbers that they do not determine
-    depends: tuple[str, ...] = ()  # numbers of the robot file with which alone it is determined
 
     @property
     def determined(self) -> bool:
@@ -95,28 +88,27 @@ class Identified:
     before: tuple[Array, ...]  # readings that the robot file predicts (rows, columns)
 
     @property
-    def rejected(self) -> bool:
-        """Whether the logs reject the model, so that the robot is the file's."""
-        return bool(self.fit.rejected)
-
-    @property
     def estimates(self) -> list[Estimate]:
         """The numbers of robot and sensors, in the order of the table of unknowns."""
         return [self._estimate(k, row) for k, row in enumerate(self.fit.rows) if row.group != START]
 
     def _estimate(self, k: int, row: Unknown) -> Estimate:
-        """Returns what was found of a number; nothing of a model that the logs reject."""
-        before, rejected = self.fit.before[row.key], self.rejected
-        # z = 0 is the file's value to the last digit
-        value = before if self.fit.kept[k] or rejected else self.fit.values[row.key]
-        deviation = 1.0 if rejected else self.fit.deviations[row.key]
+        """Returns what was found of a number."""
+        before, kept = self.fit.before[row.key], bool(self.fit.kept[k])
+        value = before if kept else self.fit.values[row.key]  # the file's to the last digit
+        deviation = self.fit.deviations[row.key]
         low, high = row.interval(value, QUANTILE * deviation)
         return Estimate(
-            row.key, row.unit, row.group, before, value,
-            max(low, row.low), min(high, row.high), deviation,
-            bool(self.fit.alone[k]) and not self.fit.kept[k] and not rejected,
-            () if rejected else self.fit.depends.get(row.key, ()),
-        )  # fmt: skip
+            key=row.key,
+            unit=row.unit,
+            group=row.group,
+            before=before,
+            value=value,
+            low=max(low, row.low),
+            high=min(high, row.high),
+            deviation=deviation,
+            alone=bool(self.fit.alone[k]) and not kept,
+        )
 
     def differences(self, part: str) -> list[tuple[Difference, Difference]]:
         """Returns the difference of each channel before and after. part: "fitted" or "held_out"."""
@@ -131,7 +123,6 @@ class Identified:
 
 
 SETTLING = 0.1  # s    at the start of a log that is not compared: the first row has noise
-LONG = 4000  # rows from which on worker processes save more time than they take to start
 TOLERANCE = {"solver.tolerance": 1e-5}  # differences of simulations need exact ones
 
 
@@ -151,8 +142,7 @@ def identify(
         robot: what is known of it.
         groups: which numbers of the table of unknowns are to be found.
         held_out: share of the rows at the end of each log that only judges the result.
-        workers: number of processes, on which the result does not depend. With more than one, the
-            calling script needs `if __name__ == "__main__"`.
+        workers: simulations at a time, on which the result does not depend.
         progress: called when a step begins, with its name.
 
     Raises HexapodError for logs without readings, and where the plant cannot follow them.
@@ -164,38 +154,21 @@ def identify(
     # small matrices: threads of linear algebra would wait for each other
     with threadpool_limits(1), TemporaryFolder("identify") as folder:
         path = export_fmu(robot, folder / "robot.fmu")
-        with LogPlant(path, TOLERANCE) as plant:
+        with ExitStack() as open_plants:
+            plants = [open_plants.enter_context(LogPlant(path, TOLERANCE)) for _ in range(workers)]
             progress("the columns of the log")
-            experiments, bad = screen(plant, robot, logs, groups=groups, held_out=held_out)
-            with worker_pool(workers, path, robot, experiments) as pool:
-                problem = Problem(plant, robot, experiments, rows, pool)
-                found = fit(problem, progress=progress)
+            experiments, bad = screen(plants[0], robot, logs, groups=groups, held_out=held_out)
+            problem = Problem(plants, robot, experiments, rows)
+            found = fit(problem, progress=progress)
             before = problem.predictions(np.zeros(len(rows)))
     return Identified(
         file=robot,
-        robot=robot if found.rejected else changed_robot(robot, rows, found.values),
+        robot=changed_robot(robot, rows, found.values),
         fit=found,
         experiments=tuple(experiments),
         bad=tuple(bad),
         before=tuple(before),
     )
-
-
-def worker_pool(
-    size: int, fmu: Path, robot: Robot, experiments: Sequence[Experiment]
-) -> AbstractContextManager[Executor | None]:
-    """Returns processes that simulate experiments with a robot's FMU; none where `size` is 1."""
-    if size == 1:
-        return nullcontext()
-    scratch = fmu.with_name("workers")
-    scratch.mkdir(exist_ok=True)
-    initialise = partial(open_plant, fmu, robot, tuple(experiments), TOLERANCE)
-    return WorkerPool(size, initialise=initialise, scratch=scratch)
-
-
-def usual_workers(logs: Sequence[Log]) -> int:
-    """Returns a number of processes for logs: that of processors, but 1 for short logs."""
-    return processor_count() if sum(len(log.time) for log in logs) >= LONG else 1
 
 
 def make_experiment(log: Log, number: int, held_out: float, *, forget: float = 0.0) -> Experiment:
@@ -248,20 +221,15 @@ def screen(
 
     plant: of the robot file's robot. groups, held_out: as of `identify`.
 
-    Raises WrongCommandsError for dead and wrong commands, LogError where no reading is left.
+    Raises LogError where no reading is left.
     """
-    for log in logs:
-        wrong = wrong_commands(log)
-        if wrong:
-            raise wrong_commands_error(log, wrong)
     logs = [with_speed_references(log, robot) for log in logs]
-    # Elastic gears stand somewhere in their play, and with zeros of the angles unknown so are the
-    # forces by which standing feet push against each other: no log shows these until each foot
-    # was lifted once, within a period of the gait.
-    forget = robot.gait.period if ELASTIC(robot) or "zero" in groups else 0.0
+    # With zeros of the angles unknown so are the forces by which standing feet push against each
+    # other: no log shows these until each foot was lifted once, within a period of the gait.
+    forget = robot.gait.period if "zero" in groups else 0.0
     experiments = [make_experiment(log, k, held_out, forget=forget) for k, log in enumerate(logs)]
     rows = chosen_unknowns(robot, logs, groups)
-    simulated = Problem(plant, robot, experiments, rows).predictions(np.zeros(len(rows)))
+    simulated = Problem([plant], robot, experiments, rows).predictions(np.zeros(len(rows)))
     found, bad = [], []
     for one, own in zip(experiments, simulated, strict=True):
         wrong = screened(one, own)

@@ -1,89 +1,22 @@
-"""Tests the footprints that reports draw, and the centres of the feet that foot
+"""Tests the warning of feet that sink too deep, and the centres of the feet that foot
 errors are computed from.
 """
 
 from __future__ import annotations
 
-import ctypes as ct
-import math
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from plant import Plant, pointer
-from states import changed
 
 from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.facts import Result
-from hexapod_cosim.cosim.results.footprints import find_footprints, sinkage_warnings
 from hexapod_cosim.cosim.results.support import SLOPE, feet_of_angles, real_feet
+from hexapod_cosim.cosim.results.warnings import sinkage_warnings
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import foot_positions, load_robot
-from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.records import Array
-from hexapod_cosim.models.soil.presets import soil_preset
-from hexapod_cosim.models.statics import standing
 
-STEP = 0.005  # s
-SLIPPED = 2e-3  # m  that a foot may slip between its last row in contact and its lift-off
 COLUMNS = (*foot_names("sinkage"), *foot_names("contact"), *foot_vector_names("position"))
-
-
-def stepped(plant: Plant, duration: float) -> Recording:
-    """Steps through a motion that lifts the legs in two groups; returns its recording."""
-    robot, group, rows = plant.robot, np.arange(6) % 2, []
-    for k in range(round(duration / STEP)):
-        phase = 2.0 * np.pi * k * STEP + np.pi * group
-        angle = robot.stance.copy()
-        angle[:, 0] += 0.2 * np.cos(phase) * np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
-        angle[:, 1] += 0.35 * np.maximum(np.sin(phase), 0.0)
-        plant.step((k + 1) * STEP, Command(angle_ref=angle))
-        foot = plant.output().foot
-        rows.append([plant.time, *foot.sinkage, *foot.contact, *np.ravel(foot.position)])
-    return Recording(("time", *COLUMNS), np.array(rows))
-
-
-def kept(plant: Plant) -> Array:
-    """Returns x, y, depth and radius (n, 4) of the plant's footprints [m]."""
-    plant.core.hx_plant_footprints.restype = ct.c_size_t
-    plant.core.hx_plant_footprints.argtypes = None  # type: ignore[assignment]
-    found = np.zeros((512, 4))
-    place = pointer(found)
-    number = plant.core.hx_plant_footprints(ct.c_void_p(plant.handle), place, ct.c_size_t(512))
-    return found[:number]
-
-
-def test_footprints_of_a_recording_are_those_of_the_plant(core: ct.CDLL) -> None:
-    robot = changed(load_robot("athena"), foot={"pad_radius": 0.025})
-    robot = replace(robot, soil=soil_preset("dry_sand").soil)
-    pose = standing(robot)
-    plant = Plant(core, robot, position=pose.position, angle=pose.angle)
-    recording = stepped(plant, 2.6)
-    found = [
-        one
-        for one in find_footprints(recording, {"foot.radius": 0.015, "foot.pad_radius": 0.025})
-        if one.end == math.inf
-    ]
-    true = kept(plant)
-    assert 12 <= len(true) <= len(found) <= len(true) + 6  # feet stand in the latest ones
-    for x, y, depth, radius in true:
-        nearest = min(found, key=lambda one: abs(one.depth - depth))
-        assert nearest.depth == depth
-        assert np.hypot(nearest.x - x, nearest.y - y) < SLIPPED
-        assert nearest.radius == radius
-
-
-def test_a_foot_that_stays_below_the_surface_takes_its_footprint_along() -> None:
-    values = {name: np.zeros(6) for name in COLUMNS}
-    values["LF.foot.sinkage"][:] = 0.01, 0.01, 0.01, 0.012, 0.012, 0.0
-    values["LF.foot.contact"][:] = 1.0, 1.0, 0.0, 1.0, 0.0, 0.0
-    values["LF.foot.position[1]"][:] = 0.1, 0.11, 0.2, 0.3, 0.4, 0.5
-    recording = Recording(("time", *COLUMNS), np.column_stack([np.arange(6.0), *values.values()]))
-    first, second = find_footprints(recording, {"foot.radius": 0.015})
-    assert (first.begin, first.end, first.x, first.depth) == (0.0, 3.0, 0.11, 0.01)
-    assert (second.begin, second.end, second.x, second.depth) == (3.0, math.inf, 0.3, 0.012)
 
 
 @pytest.mark.parametrize(

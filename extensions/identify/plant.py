@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,8 +34,8 @@ class LogPlant(Closing):
         self._outputs = set(self.fmu.names("output"))
 
     def known(self, names: Sequence[str]) -> list[str]:
-        """Returns those of some columns that follow from outputs of the FMU."""
-        return [name for name in names if self._outputs.issuperset(_terms(name))]
+        """Returns those of some columns that are outputs of the FMU."""
+        return [name for name in names if name in self._outputs]
 
     def simulate(
         self,
@@ -50,7 +50,7 @@ class LogPlant(Closing):
 
         Args:
             log: its commands are the FMU's inputs; each holds until the next row.
-            names: outputs of the FMU, or motor angles.
+            names: outputs of the FMU.
             parameters: initial state and further parameters.
             offset: added to the commanded angles (18,) [rad]; None: nothing.
             delay: how much older than its row a reading is [s]; one for all, or one for each name.
@@ -61,7 +61,7 @@ class LogPlant(Closing):
         # outputs that are read at the same time, by their delay
         sources: dict[float, dict[str, None]] = {}
         for name, own in zip(names, late, strict=True):
-            sources.setdefault(own, {}).update(dict.fromkeys(_terms(name)))
+            sources.setdefault(own, {})[name] = None
         commands = log.commands
         table = np.column_stack(list(commands.values()))
         if offset is not None:
@@ -82,11 +82,11 @@ class LogPlant(Closing):
                 where=log.where,
             ) from error
         columns = {
-            (own, term): values[:, k]
-            for (own, terms), values in zip(sources.items(), found, strict=True)
-            for k, term in enumerate(terms)
+            (name, own): values[:, k]
+            for (own, block), values in zip(sources.items(), found, strict=True)
+            for k, name in enumerate(block)
         }
-        return _summed(columns, zip(names, late, strict=True))
+        return np.column_stack([columns[pair] for pair in zip(names, late, strict=True)])
 
     def _begin(self, time: Array, parameters: Mapping[str, float]) -> None:
         """Resets and initialises the FMU. Raises FmuError for a parameter that is refused."""
@@ -118,23 +118,6 @@ class LogPlant(Closing):
     def close(self) -> None:
         """Frees the FMU."""
         self.fmu.close()
-
-
-def _terms(name: str) -> tuple[str, ...]:
-    """Returns the outputs of the FMU whose sum a column is.
-
-    The angle of a rotor, seen at its joint, is the link's and the deflection of the gear.
-    """
-    stem, _, kind = name.rpartition(".")
-    return (f"{stem}.angle", f"{stem}.gear_deflection") if kind == "motor_angle" else (name,)
-
-
-def _summed(
-    columns: Mapping[tuple[float, str], Array], wanted: Iterable[tuple[str, float]]
-) -> Array:
-    """Returns columns (rows, wanted), by name and delay, from outputs of the FMU, by both."""
-    sums = [[columns[late, term] for term in _terms(name)] for name, late in wanted]
-    return np.column_stack([np.sum(terms, axis=0) for terms in sums])
 
 
 def _events(time: Array, delays: Sequence[float]) -> list[Event]:

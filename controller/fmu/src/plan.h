@@ -1,0 +1,253 @@
+/* plan.h - plans the steps of a walk: three of them, before, at and after the present one. Python:
+ * controller/plan.py. */
+#ifndef HX_PLAN_H
+#define HX_PLAN_H
+
+#include "planned_step.h"
+
+typedef struct hxWalkPlanModel {
+  double period; /* s */
+  hxStepPlanner planner;
+  hxCommandRampModel ramp;
+  hxFootPathsModel paths;
+} hxWalkPlanModel;
+
+typedef struct hxWalkPlan {
+  hxCommandRamp ramp;
+  hxFootPaths paths;
+  int64_t at;   /* the present step, counted from the begin of its section */
+  int64_t last; /* the step at which the ramp ends, where a new section begins */
+  int cut;      /* the present step is the last of its section: a leg lifts off or touches down */
+  int has_before, has_after; /* the neighbours of the present step are planned */
+  int present;               /* index of the present step in `step`, a ring buffer */
+  hxPlannedStep step[3];
+} hxWalkPlan;
+
+static inline void hx_walk_plan_compile(const hxControllerDefinition *definition,
+                                        hxWalkPlanModel *model) {
+  model->period = definition->period;
+  hx_step_planner_compile(definition, &model->planner);
+  hx_command_ramp_compile(definition->gait.period, definition->period, &model->ramp);
+  hx_foot_paths_compile(definition, model->planner.leg, &model->paths);
+  if (model->planner.compliant) model->paths.clock.handover = model->planner.laws.support.handover;
+}
+
+/* Index of a planned step: -1 is the previous one, 0 the present one, 1 the next one. */
+static inline hxPlannedStep *hx_walk_plan_step(hxWalkPlan *plan, int neighbour) {
+  return &plan->step[(plan->present + neighbour + 3) % 3];
+}
+
+/* ------------------------------------------------------------------------------------- a step */
+
+/* Computes the command a number of periods ahead, including the posture, and returns the motion of
+ * the body. number: periods since the section began. */
+static inline hxTwist look_ahead(const hxWalkPlanModel *model, const hxCompliant *laws,
+                                 const hxWalkPlan *plan, int64_t ahead, int64_t number,
+                                 hxPlannedStep *step) {
+  hx_command_ramp_ahead(&model->ramp, &plan->ramp, ahead, step->value, step->rate);
+  hx_posture_of(&step->posture, step->value + 3, step->rate + 3);
+  const hxTwist twist = {{step->value[0], step->value[1]}, step->value[2]};
+  if (!model->planner.compliant) return twist;
+  const hxTwist added = hx_compliant_addition(&model->planner.laws, laws, number);
+  return (hxTwist){hx_plane_add(twist.velocity, added.velocity), twist.yaw_rate + added.yaw_rate};
+}
+
+/* Plans to stand in the stance. */
+static inline void hx_walk_plan_reset(const hxWalkPlanModel *model, const hxCompliant *laws,
+                                      hxWalkPlan *plan) {
+  hxPlannedStep *step = hx_walk_plan_step(plan, 0);
+  hx_command_ramp_reset(&model->ramp, &plan->ramp);
+  plan->cut = 1;
+  hx_foot_paths_reset(&model->paths, &plan->paths, &step->feet);
+  look_ahead(model, laws, plan, 0, 0, step);
+  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, step);
+}
+
+/* Plans the step a number of periods after the section began. before: the step before it. */
+static inline void plan_step(const hxWalkPlanModel *model, const hxCompliant *laws,
+                             const hxWalkPlan *plan, int64_t number, const hxPlannedStep *before,
+                             hxPlannedStep *step) {
+  const hxTwist twist = look_ahead(model, laws, plan, 1, number, step);
+  hx_foot_paths_walk(&model->paths, &plan->paths, number, twist, &before->feet, &step->feet);
+  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, step);
+}
+
+/* ----------------------------------------------------------------------------------- sections */
+
+/* Notes which feet have met the ground on their way down (C51), and narrows the stance: the steps
+ * of a commanded motion aim at the stance that the weight asks for (C53). */
+static inline void follow_sensors(const hxWalkPlanModel *model, const hxCompliant *laws,
+                                  hxWalkPlan *plan) {
+  const hxPlannedFeet *feet = &hx_walk_plan_step(plan, 0)->feet;
+  hxFootPaths *paths = &plan->paths;
+  for (int k = 0; k < HX_LEGS; ++k)
+    paths->met[k] = paths->clock.swinging[k] && feet->rise[k] < 0.0 &&
+                    hx_compliance_meets(&model->planner.laws.laws, k, &laws->laws);
+  if (hx_command_ramp_moves(&plan->ramp)) paths->narrowing = laws->adaptation.narrowing;
+}
+
+/* Returns whether the gait clock waits for feet at the ends of their swings (C50). */
+static inline int waits(const hxWalkPlanModel *model, const hxCompliant *laws,
+                        const hxWalkPlan *plan) {
+  const hxGaitClock *clock = &plan->paths.clock;
+  int landing[HX_LEGS];
+  if (!model->planner.compliant) return 0;
+  hx_gait_clock_landing(&model->paths.clock, clock, plan->at, landing);
+  return hx_compliance_waits(&model->planner.laws.laws, landing, clock->held, &laws->laws);
+}
+
+/* Begins a new section at the present step, and plans the next step. waiting: the gait clock stands
+ * still in it. */
+static inline void plan_afresh(const hxWalkPlanModel *model, int waiting, hxCompliant *laws,
+                               hxWalkPlan *plan) {
+  const int moves = hx_command_ramp_moves(&plan->ramp),
+            settled = hx_command_ramp_settled(&model->ramp, &plan->ramp);
+  hxPlannedStep *first = hx_walk_plan_step(plan, 0);
+  const hxPlannedFeet now = first->feet;
+  if (model->planner.compliant)
+    hx_compliant_steer(&model->planner.laws, plan->at, moves, plan->cut, laws);
+  const hxTwist twist = look_ahead(model, laws, plan, 0, 0, first);
+  if (waiting)
+    hx_foot_paths_hold(&model->paths, &now, plan->at, twist, &plan->paths, &first->feet);
+  else
+    hx_foot_paths_plan(&model->paths, &now, plan->at, moves || !settled, twist, &plan->paths,
+                       &first->feet);
+  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, first);
+  plan->last = moves || settled ? INT64_MAX : model->ramp.end - plan->ramp.steps;
+  plan->at = 0;
+  plan_step(model, laws, plan, 1, first, hx_walk_plan_step(plan, 1));
+}
+
+/* Makes the planned step the present one, and plans the step after it. command_changed: the plan no
+ * longer applies, and a new section begins. */
+static inline void hx_walk_plan_advance(const hxWalkPlanModel *model, int command_changed,
+                                        hxCompliant *laws, hxWalkPlan *plan) {
+  const int due = command_changed || !plan->has_after;
+  if (model->planner.compliant) follow_sensors(model, laws, plan);
+  if (due || plan->paths.clock.held) {
+    const int waiting = waits(model, laws, plan);
+    if (due || !waiting) plan_afresh(model, waiting, laws, plan);
+  }
+  plan->present = (plan->present + 1) % 3;
+  ++plan->at;
+  ++plan->ramp.steps;
+  const int64_t next = plan->at + 1;
+  const int reached = hx_gait_clock_reach(&model->paths.clock, &plan->paths.clock, next);
+  plan->has_before = 1;
+  plan->has_after = reached && next <= plan->last;
+  plan->cut = !reached && next <= plan->last;
+  if (plan->has_after)
+    plan_step(model, laws, plan, next, hx_walk_plan_step(plan, 0), hx_walk_plan_step(plan, 1));
+}
+
+/* ----------------------------------------------------------------- change of gait and control */
+
+/* Lets the legs finish their steps and begin no other (C55). */
+static inline void hx_walk_plan_end(hxWalkPlan *plan) {
+  plan->has_after = 0;
+  plan->paths.clock.ending = plan->paths.clock.walking;
+}
+
+/* Returns whether all legs stand and carry their whole loads. */
+static inline int hx_walk_plan_ended(hxWalkPlan *plan) {
+  int ended = hx_gait_clock_ended(&plan->paths.clock);
+  if (!plan->paths.clock.walking) return 1;
+  for (int k = 0; k < HX_LEGS; ++k) ended &= hx_walk_plan_step(plan, 0)->activation[k] >= 1.0;
+  return ended;
+}
+
+/* Goes on with the standing feet and the command in another gait (C55). before: the model of the
+ * gait so far. */
+static HX_SELDOM void hx_walk_plan_adopt(hxWalkPlanModel *model, const hxWalkPlanModel *before,
+                                         hxWalkPlan *plan) {
+  hx_command_ramp_carry(&model->ramp, &before->ramp, &plan->ramp);
+  hx_foot_paths_join(&model->paths, &plan->paths, &hx_walk_plan_step(plan, 0)->feet);
+  plan->has_after = 0;
+  plan->at = 0;
+  plan->last = INT64_MAX;
+  plan->cut = 1;
+}
+
+/* Goes on in the phase of the plan under another control, in the same gait. before: the paths'
+ * model under the control before. */
+static HX_SELDOM void hx_walk_plan_carry(hxWalkPlanModel *model, const hxFootPathsModel *before,
+                                         hxWalkPlan *plan) {
+  hxGaitClockModel *clock = &model->paths.clock;
+  memcpy(clock->offset, before->clock.offset, sizeof clock->offset);
+  memcpy(clock->late, before->clock.late, sizeof clock->late);
+  memset(plan->paths.met, 0, sizeof plan->paths.met);
+  if (!model->planner.compliant) plan->paths.narrowing = 0.0;
+  plan->has_after = 0;
+  plan->cut = 1;
+}
+
+/* --------------------------------------------------------------------------- the present step */
+
+/* Returns the rate of a quantity at the present step, one-sided at the end of a section. */
+static inline double rate_of(const hxWalkPlan *plan, double before, double now, double after,
+                             double period) {
+  if (plan->has_after && plan->has_before) return (after - before) / (2.0 * period);
+  return plan->has_before ? (now - before) / period : 0.0;
+}
+
+/* Returns the rate of a vector of a plane at the present step. */
+static inline hxPlane rate_of_plane(const hxWalkPlan *plan, hxPlane before, hxPlane now,
+                                    hxPlane after, double period) {
+  return hx_plane(rate_of(plan, before.x, now.x, after.x, period),
+                  rate_of(plan, before.y, now.y, after.y, period));
+}
+
+/* Computes the centre of a foot as the command plans it: on its path, rolling, not lowered. */
+static inline void hx_walk_plan_centre(hxWalkPlan *plan, int k, double centre[3]) {
+  const hxPlannedStep *now = hx_walk_plan_step(plan, 0);
+  hxPlane plane = hx_plane_add(now->plane[k], now->shift[k]);
+  double height = now->feet.height[k];
+  hx_posture_see_place(&now->posture, &plane, &height);
+  centre[0] = plane.x;
+  centre[1] = plane.y;
+  centre[2] = height;
+}
+
+/* Computes a foot of the present step with rolling and lowering, torso frame [m, m/s]. */
+static inline void hx_walk_plan_foot(const hxWalkPlanModel *model, hxWalkPlan *plan, int k,
+                                     hxPlane *plane, double *height, hxPlane *velocity,
+                                     double *rise) {
+  const double period = model->period;
+  const hxPlannedStep *before = hx_walk_plan_step(plan, -1), *now = hx_walk_plan_step(plan, 0),
+                      *after = hx_walk_plan_step(plan, 1);
+  const hxPlane rolling =
+                    rate_of_plane(plan, before->shift[k], now->shift[k], after->shift[k], period),
+                swaying = rate_of_plane(plan, before->torso, now->torso, after->torso, period);
+  *plane = hx_plane_add(now->plane[k], now->shift[k]);
+  *velocity = hx_plane_add(hx_plane_sub(now->feet.velocity[k], swaying), rolling);
+  *height = now->height[k];
+  *rise = now->feet.rise[k] -
+          rate_of(plan, before->lowering[k], now->lowering[k], after->lowering[k], period);
+  hx_posture_see(&now->posture, plane, height, velocity, rise);
+}
+
+/* Returns the height of the path of a foot over the stance [m]. */
+static inline double hx_walk_plan_lift(const hxWalkPlanModel *model, hxWalkPlan *plan, int k) {
+  return hx_walk_plan_step(plan, 0)->feet.height[k] - model->paths.home_height[k];
+}
+
+/* Returns the step after (else before) the present one, NULL when there is none, and its time from
+ * there in *time [s]. */
+static inline const hxPlannedStep *hx_walk_plan_neighbour(const hxWalkPlanModel *model,
+                                                          hxWalkPlan *plan, double *time) {
+  *time = plan->has_after ? model->period : -model->period;
+  if (plan->has_after) return hx_walk_plan_step(plan, 1);
+  return plan->has_before ? hx_walk_plan_step(plan, -1) : NULL;
+}
+
+/* Returns the masses and poses of the three steps; at the ends of sections, of one alone. */
+static inline hxNeighbours hx_walk_plan_motion(hxWalkPlan *plan) {
+  const hxPlannedStep *before = hx_walk_plan_step(plan, -1), *now = hx_walk_plan_step(plan, 0),
+                      *after = hx_walk_plan_step(plan, 1);
+  if (!plan->has_before || !plan->has_after)
+    return (hxNeighbours){{NULL, &now->masses, NULL}, {NULL, now->pose, NULL}};
+  return (hxNeighbours){{&before->masses, &now->masses, &after->masses},
+                        {before->pose, now->pose, after->pose}};
+}
+
+#endif

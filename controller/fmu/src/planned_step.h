@@ -1,0 +1,118 @@
+/* planned_step.h - places the legs for the planned feet of one step. Python:
+ * controller/planned_step.py. */
+#ifndef HX_PLANNED_STEP_H
+#define HX_PLANNED_STEP_H
+
+#include "comply/compliant.h"
+#include "comply/sway.h"
+#include "walk/command.h"
+#include "walk/foot_paths.h"
+#include <string.h>
+
+/* One planned step. It depends on the command alone. Feet are in the walking frame. */
+typedef struct hxPlannedStep {
+  double value[HX_COMMANDS],
+      rate[HX_COMMANDS]; /* vx vy yaw_rate height roll pitch, and per second */
+  hxPosture posture;
+  hxPlannedFeet feet;
+  hxPlane torso;              /* m, way of the torso from its nominal place (C54) */
+  hxPlane plane[HX_LEGS];     /* m, of the feet from the torso */
+  double activation[HX_LEGS]; /* 1 */
+  double lowering[HX_LEGS];   /* m, deformation of the ground */
+  double height[HX_LEGS];     /* m, of the lowered feet */
+  hxPlane shift[HX_LEGS];     /* m, of contact points, by rolling */
+  hxPose pose[HX_LEGS];
+  hxMasses masses;
+} hxPlannedStep;
+
+/* Constants of the plan of a step. */
+typedef struct hxStepPlanner {
+  int compliant; /* compliant control, which lowers feet; otherwise there are no laws */
+  hxLegSolver leg[HX_LEGS];
+  hxCompliantModel laws;
+  hxSway sway;
+} hxStepPlanner;
+
+static inline void hx_step_planner_compile(const hxControllerDefinition *definition,
+                                           hxStepPlanner *model) {
+  model->compliant = definition->control == HX_CONTROL_COMPLIANT;
+  for (int k = 0; k < HX_LEGS; ++k) hx_leg_solver_compile(definition, k, &model->leg[k]);
+  if (!model->compliant) return;
+  hx_compliant_compile(definition, model->leg, &model->laws);
+  hx_sway_compile(definition, model->leg, &model->laws.dynamics, &model->sway);
+}
+
+/* Computes the poses of legs whose contact points are shifted from the planned feet. */
+static inline void reach_all(const hxLegSolver leg[HX_LEGS], const hxPlane shift[HX_LEGS],
+                             hxPlannedStep *step) {
+  hxPlane seen[HX_LEGS];
+  double z[HX_LEGS];
+  for (int k = 0; k < HX_LEGS; ++k) {
+    seen[k] = hx_plane_add(step->plane[k], shift[k]);
+    z[k] = step->height[k];
+    hx_posture_see_place(&step->posture, &seen[k], &z[k]);
+  }
+  hx_leg_solver_poses(leg, (const hxPlane *)seen, (const double *)z, step->pose);
+}
+
+/* Computes by how far the feet's contact points shift because their spheres roll (C9), and the
+ * poses of the legs. A tibia that pitches by dB rolls the sphere by -R dB along the outward
+ * direction of the leg. The shift s changes B itself: s = R (C + s dC/du) is solved by one Newton
+ * step. What is rolled on the way to another position than that of the stance is no shift. */
+static inline void place_legs(const hxLegSolver leg[HX_LEGS], hxPlannedStep *step) {
+  const hxPlane none[HX_LEGS] = {{0.0, 0.0}};
+  reach_all(leg, none, step);
+  for (int k = 0; k < HX_LEGS; ++k) {
+    const hxPose *pose = &step->pose[k];
+    double slope[HX_JOINTS];
+    hx_leg_solver_speeds(&leg[k], pose, pose->heading, 0.0, slope);
+    const double rolls = hx_leg_solver_rolling(&leg[k], pose->angle) - step->feet.rolled[k];
+    step->shift[k] =
+        hx_scaled(pose->heading, rolls / (1.0 - leg[k].radius * (slope[2] - slope[1])));
+  }
+  reach_all(leg, (const hxPlane *)step->shift, step);
+}
+
+/* Computes the poses of the legs and the point masses for a torso that has moved. */
+static inline void stand(const hxStepPlanner *model, const hxGaitClock *clock,
+                         hxPlannedStep *step) {
+  for (int k = 0; k < HX_LEGS; ++k) step->plane[k] = hx_plane_sub(step->feet.plane[k], step->torso);
+  if (model->compliant) {
+    hx_compliant_lowered(&model->laws, clock, step->feet.phase, step->plane, step->activation,
+                         step->lowering);
+  } else {
+    memset(step->lowering, 0, sizeof step->lowering);
+    for (int k = 0; k < HX_LEGS; ++k) step->activation[k] = 1.0;
+  }
+  for (int k = 0; k < HX_LEGS; ++k) step->height[k] = step->feet.height[k] - step->lowering[k];
+  place_legs(model->leg, step);
+  if (!model->compliant) return;
+  const hxPlane turn = hx_cis(step->feet.turn);
+  hx_inverse_dynamics_place(&model->laws.dynamics, model->leg, step->pose,
+                            hx_plane_add(step->feet.way, hx_times(turn, step->torso)), turn,
+                            &step->posture, &step->masses);
+}
+
+/* Computes way of the torso, poses of the legs and point masses for planned feet. clock: of the
+ * gait, in the section of the step. */
+static inline void hx_step_planner_lay_out(const hxStepPlanner *model, const hxGaitClock *clock,
+                                           const hxCompliant *laws, hxPlannedStep *step) {
+  const hxSway *sway = &model->sway;
+  const double narrowing = laws->adaptation.narrowing;
+  step->torso = hx_plane(0.0, 0.0);
+  if (model->compliant && hx_sway_acts(sway, narrowing)) {
+    const double laden = hx_load_adaptation_laden(&laws->adaptation);
+    step->torso = hx_sway_guess(sway, &step->feet, laden);
+    stand(model, clock, step);
+    step->torso = hx_scaled(
+        hx_sway_of(sway, &model->laws.dynamics, step->torso, &step->masses, laden), narrowing);
+  }
+  stand(model, clock, step);
+}
+
+/* Returns the weight that moves with the torso over the modelled one [1] (C53). */
+static inline double hx_step_planner_laden(const hxStepPlanner *model, const hxCompliant *laws) {
+  return model->sway.active ? hx_load_adaptation_laden(&laws->adaptation) : 1.0;
+}
+
+#endif
