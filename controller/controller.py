@@ -25,8 +25,8 @@ from hexapod_cosim.controller.plan import WalkPlan
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, rows_of
 from hexapod_cosim.controller.sense.health import Health
 from hexapod_cosim.controller.signals import Diagnostics, JointCommand, Measurement
-from hexapod_cosim.controller.walk.command import BodyCommand
 from hexapod_cosim.controller.walk.absence import gait_without
+from hexapod_cosim.controller.walk.command import BodyCommand
 from hexapod_cosim.controller.walk.fade import Fade
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.gait_clock import NO_LEG
@@ -76,7 +76,10 @@ class Controller(Stateful):
     an impossible period.
     """
 
-    STATE = ("plan", "compliant", "paper", "fade", "_start", "_count", "_shown", "_next", "_back", "health")
+    STATE = (
+        "plan", "compliant", "paper", "fade", "health", "_start", "_count", "_shown", "_next",
+        "_back",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -92,8 +95,9 @@ class Controller(Stateful):
         _check_law(law)
         self.robot, self.period, self.gains, self.parts = robot, period, gains, parts
         self.legs, self.stance, self.law = LegSolver(robot), robot.stance, law
-        self.fade, self.health = Fade(period=period), self._new_health()
-        self.gait = gait  # asked for; without a leg, another is walked
+        self.fade = Fade(period=period)
+        self.health = Health(robot, gains, legs=self.legs, period=period)
+        self.gait = gait  # that was asked for; without a leg, another one is walked
         self._build(gait)
         self._next: Gait | None = None  # that the legs change to
         self._back: int | None = None  # leg that is taken back into service then
@@ -106,7 +110,7 @@ class Controller(Stateful):
 
     def _build(self, gait: Gait) -> None:
         """Builds the parts, whose constants depend on the gait."""
-        robot, gains, parts = self.robot, self.gains, self.parts
+        self._walked, robot, gains, parts = gait, self.robot, self.gains, self.parts
         legs, period = self.legs, self.period
         self.compliant: Compliant | None = None
         self.paper: Paper | None = None
@@ -124,16 +128,20 @@ class Controller(Stateful):
             return
         plan, laws, paper = self.plan, self.compliant, self.paper
         self._build(self._next)
-        back, self._back = self._back, None
         if self.compliant is not None and laws is not None:
             self.compliant.restore(laws.save())
             self.compliant.present = laws.present
         if self.paper is not None and paper is not None:
             self.paper.restore(paper.save())
-        self.plan.adopt(plan, back)
-        self._next = None
-        if back is not None and self.plan.absence.legs.any():
-            self._change(self._gait_now(NO_LEG))
+        self.plan.adopt(plan, self._back)
+        self._next = self._back = None
+
+    def _change(self, back: int | None = None) -> None:
+        """Begins a change to the gait of the legs in service, with one that comes back (C58)."""
+        absent = self.plan.absence.legs & (np.arange(LEGS) != back)
+        backwards = self.plan.ramp.target.vx < 0.0
+        self._next, self._back = gait_without(self.gait, absent, backwards=backwards), back
+        self.plan.end()
 
     def change_gait(self, gait: Gait) -> None:
         """Changes the gait without a jump of the feet, while the robot walks (C55).
@@ -144,42 +152,25 @@ class Controller(Stateful):
         """
         _check_period(self.period, gait)
         self.gait = gait
-        self._change(self._gait_now(NO_LEG))
+        self._change()
         self._adopt()
 
-    def _gait_now(self, back: Mask) -> Gait:
-        """Returns the gait of the legs in service, and of those (6,) that come back."""
-        absent = self.plan.absence.legs & ~back
-        return gait_without(self.gait, absent, backwards=self.plan.ramp.target.vx < 0.0)
-
-    def _change(self, gait: Gait) -> None:
-        """Begins a change of gait (C55)."""
-        self._next = gait
-        self.plan.end()
-
-    def _new_health(self) -> Health | None:
-        """Returns the watch over the servos; None under kinematic control."""
-        if self.gains is None:
-            return None
-        most = self.gains.limits.torque
-        return Health(self.robot.servo, legs=self.legs, most=most, period=self.period)
-
-    def _watch(self, health: Health, measurement: Measurement) -> None:
-        """Finds legs that are lost, before the present step is planned (C57)."""
+    def _watch(self, measurement: Measurement) -> None:
+        """Takes legs that are lost out of service, before the present step is planned (C57)."""
+        health = self.health
         health.step(measurement.angle, sense(measurement, LEVEL), self._out)
         if self.plan.lose(health.lost, self._out):
-            self._next, self._back = self._gait_now(NO_LEG), None
+            self._change()
 
-    def _fold(self, health: Health, measurement: Measurement) -> None:
+    def _fold(self, measurement: Measurement) -> None:
         """Folds legs out of service away, and takes back one that works again (C58)."""
         absence = self.plan.absence
         if not absence.legs.any():
             return
-        there = absence.fold(measurement.angle, health.faulty, health.locked, self._out)
+        there = absence.fold(measurement.angle, self.health, self._out)
         self.diagnostics.unreachable[...] &= ~absence.legs
         if there.any() and self._back is None:
-            self._back = int(np.argmax(there))
-            self._change(self._gait_now(np.arange(LEGS) == self._back))
+            self._change(int(np.argmax(there)))
 
     def change_control(self, gains: Gains | None, law: str = "compliant") -> None:
         """Changes the control while the robot walks: arguments as for the constructor.
@@ -192,8 +183,8 @@ class Controller(Stateful):
         _check_law(law)
         self.gains, self.law = gains, law
         self.warnings = gains_warnings(self.robot, gains, self.period)
-        plan, self.health = self.plan, self._new_health()
-        self._build(self._gait_now(NO_LEG))
+        plan, self.health = self.plan, Health(self.robot, gains, legs=self.legs, period=self.period)
+        self._build(self._walked)
         if self._start is None:
             self.reset()
             return
@@ -286,14 +277,16 @@ class Controller(Stateful):
 
     def save(self) -> dict[str, Any]:
         """Returns the state that restore() takes; it includes gait and control."""
-        return super().save() | {"gait": self.gait, "control": (self.gains, self.law)}
+        gaits = {"gait": self.gait, "walked": self._walked}
+        return super().save() | gaits | {"control": (self.gains, self.law)}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restores a state returned by save(); the following steps repeat exactly."""
         control = self.gains, self.law
-        if (state["gait"], state["control"]) != (self.gait, control):
+        if (state["walked"], state["control"]) != (self._walked, control):
             self.gains, self.law = state["control"]
-            self._build(state["gait"])
+            self._build(state["walked"])
+        self.gait = state["gait"]
         own = {name: value for name, value in state.items() if name in self.STATE}
         super().restore(own)
         self._follow_paths()
@@ -327,14 +320,15 @@ class Controller(Stateful):
                 self._start = t
             else:
                 self._count += 1
-                if self.health is not None:
-                    self._watch(self.health, measurement)
+                if self.gains is not None:
+                    self._watch(measurement)
                 self.plan.advance(command_changed)
             self._follow_paths()
             self._apply_laws(measurement)
             self.fade.step(self.legs, self._out)
-            if self.health is not None:
-                self._fold(self.health, measurement)
+            self._fold(measurement)
+            self.diagnostics.absent[...] = self.plan.absence.legs
+            self.diagnostics.faulty[...] = self.health.faulty.T
             self._adopt()
         return self._out
 

@@ -9,13 +9,16 @@ load. Either way the model gives a torque near the servo's largest that nothing 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, clamp
 from hexapod_cosim.controller.signals import JointCommand
 from hexapod_cosim.controller.walk.kinematics import LegSolver
-from hexapod_cosim.models import Servo
+from hexapod_cosim.models import Robot
 
 STRANGE = 0.5  # 1    of the largest torque, that nothing explains
 STRANGE_TIME = 0.06  # s    in one direction: the servo does not work
@@ -38,9 +41,12 @@ class Health(Stateful):
 
     STATE = ("strange", "angle", "still", "locked", "proof", "faulty")
 
-    def __init__(self, servo: Servo, *, legs: LegSolver, most: float, period: float) -> None:
-        """Starts with sound servos. most: largest torque of a servo [N m]; period [s]."""
-        self.stiffness, self.most, self.legs, self.period = servo.kp, most, legs, period
+    def __init__(
+        self, robot: Robot, gains: Gains | None, *, legs: LegSolver, period: float
+    ) -> None:
+        """Starts with sound servos. Kinematic control, without gains, does not watch them."""
+        self.stiffness, self.legs, self.period = robot.servo.kp, legs, period
+        self.most = math.inf if gains is None else gains.limits.torque  # N m
         self.reset()
 
     def reset(self) -> None:
@@ -63,7 +69,7 @@ class Health(Stateful):
         torque = self.stiffness * (reached - angle) + command.torque_ref
         low = -self.most * clamp(1.0 + load, 0.0, 1.0)
         torque = clamp(torque, low, self.most * clamp(1.0 - load, 0.0, 1.0))
-        return torque + (self.legs.jacobian(angle).swapaxes(1, 2) @ force[:, :, None])[:, :, 0]
+        return np.asarray(torque - self.legs.load_torques(angle, force))
 
     def step(self, angle: Array, force: Array, command: JointCommand) -> None:
         """Judges the servos by a period under a command.

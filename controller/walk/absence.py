@@ -1,7 +1,7 @@
 """Walks without legs that are out of service, and takes them back (C58). C: absence.h.
 
-A leg without a working servo is folded away by its other joints, and its faulty servos are tried
-all the time by a small swing of their commands. The others walk a wave without it, as fast as their
+A leg with a faulty servo is folded away by its other joints, and faulty servos are tried all the
+time by a small swing of their commands. The others walk a wave without it, as fast as their
 reach allows, under a torso whose centre is over the centre of their feet.
 """
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, clamp
+from hexapod_cosim.controller.sense.health import Health
 from hexapod_cosim.controller.signals import JointCommand
 from hexapod_cosim.controller.walk.gait import PATTERNS, Gait
 from hexapod_cosim.controller.walk.kinematics import LegSolver
@@ -24,8 +25,9 @@ BACK_TIME = 3.0  # s    in which the walk then takes the torso back to its path
 FAR_SHIFT = 0.08  # m    at most
 FOLD_SPEED = 4.0  # rad/s
 LEAD = 0.15  # rad    of a command before its joint, at most
+LIMP = 0.25  # rad    from its place, at which a faulty joint has another one
 MARGIN = 0.1  # rad    of a folded joint from its limit
-TRIAL, TRIAL_TIME = 0.15, 1.0  # rad, s    size and period of the swing of a folded joint
+TRIAL, TRIAL_TIME = 0.08, 1.0  # rad, s    size and period of the swing of a faulty joint
 ARRIVED = 1e-3  # rad    a command this near to the plan is the plan
 
 
@@ -60,7 +62,9 @@ def folded(legs: LegSolver, faulty: Mask, locked: Mask) -> Array:
     """
     pose = legs.stance.copy()
     pose[:, 1] = legs.angle_max[:, 1] - MARGIN
-    tibia = np.where(locked[:, 1], legs.angle_min[:, 2], legs.angle_max[:, 2] - 2.0 * MARGIN) + MARGIN
+    tibia = (
+        np.where(locked[:, 1], legs.angle_min[:, 2], legs.angle_max[:, 2] - 2.0 * MARGIN) + MARGIN
+    )
     pose[:, 2] = np.where(faulty[:, 1], tibia, pose[:, 2])
     return pose
 
@@ -71,13 +75,14 @@ class Absence(Stateful):
     Attributes:
         legs: (6,) out of service.
         command: (6, 3) commanded angles of these legs [rad].
+        place: (6, 3) angles around which their faulty joints are tried [rad].
         since: periods since the legs out of service changed (scalar).
         begin, goal: ways of the torso from its nominal place, walking frame, x + i y (scalars) [m].
         gone: (6,) that were out of service before.
         trial: periods since the begin, for the trial (scalar).
     """
 
-    STATE = ("legs", "command", "since", "begin", "goal", "gone", "trial")
+    STATE = ("legs", "command", "place", "since", "begin", "goal", "gone", "trial")
 
     def __init__(self, legs: LegSolver, home: Plane, *, handover: float, period: float) -> None:
         """Starts with all legs. home: (6,) feet of the stance [m]; handover: of a load [s]."""
@@ -89,7 +94,7 @@ class Absence(Stateful):
         """Takes all legs back at once."""
         none = np.zeros(LEGS, dtype=np.bool_)
         self.legs, self.gone = none, none
-        self.command = np.zeros((LEGS, 3))
+        self.command, self.place = np.zeros((2, LEGS, 3))
         self.since = round((SHIFT_TIME + BACK_TIME) / self.period) + 1
         self.trial, self.begin, self.goal = 0, 0j, 0j
 
@@ -104,6 +109,7 @@ class Absence(Stateful):
         if not new.any():
             return False
         self.command = np.where(new[:, None], out.angle_ref, self.command)
+        self.place = np.where(new[:, None], out.angle_ref, self.place)
         self._set(self.legs | new)
         return True
 
@@ -144,17 +150,20 @@ class Absence(Stateful):
         left = 0.0 if x >= 1.0 else 1.0 - x * x * (3.0 - 2.0 * x)
         return np.where(self.legs, np.where(self.gone, 0.0, left), 1.0)
 
-    def fold(self, angle: Array, faulty: Mask, locked: Mask, out: JointCommand) -> Mask:
+    def fold(self, angle: Array, health: Health, out: JointCommand) -> Mask:
         """Replaces the commands of the legs out of service, in place.
 
         Legs without a faulty servo return to the plan. Returns the legs (6,) that are there.
 
-        angle: (6, 3) measured [rad]; faulty, locked: as for folded().
+        angle: (6, 3) measured [rad]; health: of the servos.
         """
+        faulty, lost = health.faulty, health.lost
         swing = TRIAL * math.sin(math.tau * self.trial * self.period / TRIAL_TIME)
         self.trial += 1
-        target = folded(self.solver, faulty, locked) + np.where(faulty, swing, 0.0)
-        lost = faulty.any(axis=1)
+        target = folded(self.solver, faulty, health.locked)
+        moved = (np.abs(angle - self.place) > LIMP) & self.legs[:, None]
+        self.place = np.where(moved, angle, self.place)
+        target = np.where(faulty, self.place + swing, target)
         target = np.where(lost[:, None], target, out.angle_ref)
         target = clamp(target, self.solver.angle_min, self.solver.angle_max)
         step = FOLD_SPEED * self.period

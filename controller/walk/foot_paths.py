@@ -177,9 +177,7 @@ class FootPaths(Stateful):
             plane=back * (self._ground_of(feet) - feet.way),
             height=self.home_height + lift,
             velocity=np.where(away, 0.0, velocity),
-            rise=np.where(
-                self.clock.swinging, np.where(dropped, -fall, climb * pace), 0.0
-            ),
+            rise=np.where(self.clock.swinging, np.where(dropped, -fall, climb * pace), 0.0),
         )
 
     def _set_out(self, now: PlannedFeet, twist: Twist) -> PlannedFeet:
@@ -240,7 +238,9 @@ class FootPaths(Stateful):
         far = np.abs(feet.plane - motion * time - self._aims())
         return float(far[~self.clock.absent].max())
 
-    def _steadiness(self, feet: PlannedFeet, begin: Array, torso: Callable[[int], complex]) -> float:
+    def _steadiness(
+        self, feet: PlannedFeet, begin: Array, torso: Callable[[int], complex]
+    ) -> float:
         """Returns the least distance of the torso within its support in the coming steps [m] (C58).
 
         feet, begin: as for _farthest(); torso: its way from its nominal place [m].

@@ -131,6 +131,7 @@ class GaitClock(Stateful):
 
     def drop(self) -> None:
         """Ends the swings at once; the walk ends with them (C58)."""
+        self.swinging = self.swinging & ~self.absent
         self.ending, self.dropped, self.held = True, self.swinging, False
         self.awaited = NO_LEG
 
@@ -168,7 +169,7 @@ class GaitClock(Stateful):
 
         number: periods since the section began.
         """
-        if not self.walking:
+        if not self.walking or self.dropped.any():
             return NO_LEG
         stands = self.phase_after(self.reached(number) + 1) < self.gait.duty
         return np.asarray(self.swinging & stands)

@@ -34,6 +34,7 @@ from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.facts import FmuIdentity, Result, RobotIdentity, RunFacts
 from hexapod_cosim.cosim.results.locomotion import (
     describe_fall,
+    found_faults,
     is_sent_ahead,
     locomotion_of,
     missed_end,
@@ -190,7 +191,12 @@ def make_result(
             *heat_warnings(view.recording, plan.robot.servo),
             *missing,
         ),
-        events=tuple(event_log(scenario, outcome.simulated)),
+        events=tuple(
+            sorted(
+                [*event_log(scenario, outcome.simulated), *found_faults(outcome.judged)],
+                key=lambda event: float(event["time"]),
+            )
+        ),
         gains=None if setup.gains is None else setup.gains.as_facts(),
         walk=locomotion_of(view, upright=not fall, missed=missed),
         drawn=None if drawn is None else drawn.as_facts(),
