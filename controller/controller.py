@@ -97,7 +97,7 @@ class Controller(Stateful):
         self.legs, self.stance, self.law = LegSolver(robot), robot.stance, law
         self.fade = Fade(period=period)
         self.health = Health(robot, gains, legs=self.legs, period=period)
-        self.gait = gait  # that was asked for; without a leg, another one is walked
+        self._asked = gait  # that was asked for; without a leg, another one is walked
         self._build(gait)
         self._next: Gait | None = None  # that the legs change to
         self._back: int | None = None  # leg that is taken back into service then
@@ -110,7 +110,7 @@ class Controller(Stateful):
 
     def _build(self, gait: Gait) -> None:
         """Builds the parts, whose constants depend on the gait."""
-        self._walked, robot, gains, parts = gait, self.robot, self.gains, self.parts
+        self.gait, robot, gains, parts = gait, self.robot, self.gains, self.parts
         legs, period = self.legs, self.period
         self.compliant: Compliant | None = None
         self.paper: Paper | None = None
@@ -140,7 +140,7 @@ class Controller(Stateful):
         """Begins a change to the gait of the legs in service, with one that comes back (C58)."""
         absent = self.plan.absence.legs & (np.arange(LEGS) != back)
         backwards = self.plan.ramp.target.vx < 0.0
-        self._next, self._back = gait_without(self.gait, absent, backwards=backwards), back
+        self._next, self._back = gait_without(self._asked, absent, backwards=backwards), back
         self.plan.end()
 
     def change_gait(self, gait: Gait) -> None:
@@ -151,7 +151,7 @@ class Controller(Stateful):
         for the period, and then changes nothing.
         """
         _check_period(self.period, gait)
-        self.gait = gait
+        self._asked = gait
         self._change()
         self._adopt()
 
@@ -184,7 +184,7 @@ class Controller(Stateful):
         self.gains, self.law = gains, law
         self.warnings = gains_warnings(self.robot, gains, self.period)
         plan, self.health = self.plan, Health(self.robot, gains, legs=self.legs, period=self.period)
-        self._build(self._walked)
+        self._build(self.gait)
         if self._start is None:
             self.reset()
             return
@@ -268,6 +268,8 @@ class Controller(Stateful):
     def reset(self) -> None:
         """Puts the robot in its stance and clears all memory; the next step is the first."""
         self._back = None
+        if self.gait != self._asked:
+            self._build(self._asked)
         for part in (self.compliant, self.paper, self.fade, self.health, self.plan):
             if part is not None:
                 part.reset()
@@ -277,16 +279,16 @@ class Controller(Stateful):
 
     def save(self) -> dict[str, Any]:
         """Returns the state that restore() takes; it includes gait and control."""
-        gaits = {"gait": self.gait, "walked": self._walked}
+        gaits = {"gait": self.gait, "asked": self._asked}
         return super().save() | gaits | {"control": (self.gains, self.law)}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restores a state returned by save(); the following steps repeat exactly."""
         control = self.gains, self.law
-        if (state["walked"], state["control"]) != (self._walked, control):
+        if (state["gait"], state["control"]) != (self.gait, control):
             self.gains, self.law = state["control"]
-            self._build(state["walked"])
-        self.gait = state["gait"]
+            self._build(state["gait"])
+        self._asked = state["asked"]
         own = {name: value for name, value in state.items() if name in self.STATE}
         super().restore(own)
         self._follow_paths()

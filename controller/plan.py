@@ -115,11 +115,13 @@ class WalkPlan(Stateful):
             paths.narrowing = laws.adaptation.narrowing
 
     def _waits(self) -> bool:
-        """Returns whether the gait clock waits for feet at the ends of their swings (C50)."""
+        """Returns whether the gait clock waits for feet at the ends of their swings (C50).
+
+        Without a leg, a foot may have no load to carry: it need only touch the ground.
+        """
         clock = self.paths.clock
-        return self.laws is not None and self.laws.laws.waits(
-            clock.landing(self.at), held=clock.held
-        )
+        held = clock.held and not clock.absent.any()
+        return self.laws is not None and self.laws.laws.waits(clock.landing(self.at), held=held)
 
     def _plan_afresh(self, *, waiting: bool) -> None:
         """Begins a new section at the present step, and plans the step after it.

@@ -20,10 +20,10 @@ from hexapod_cosim.controller.signals import JointCommand
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
 
-STRANGE = 0.5  # 1    of the largest torque, that nothing explains
+STRANGE_SHARE = 0.5  # 1    of the largest torque, that nothing explains
 STRANGE_TIME = 0.06  # s    in one direction: the servo does not work
-STILL = 0.05  # rad/s    of a joint that does not move
-SOUND = 0.35  # 1    of the largest torque: the servo seems to work
+STILL_SPEED = 0.05  # rad/s    of a joint that does not move
+SOUND_SHARE = 0.35  # 1    of the largest torque: the servo seems to work
 PROOF_TIME = 1.2  # s    for which a servo must seem to work: longer than a period of the trial
 
 
@@ -59,7 +59,7 @@ class Health(Stateful):
     @property
     def lost(self) -> Mask:
         """Returns the legs (6,) of which some servo does not work."""
-        return self.faulty.any(axis=1)
+        return np.asarray(self.faulty.any(axis=1))
 
     def _unexplained(self, angle: Array, force: Array, command: JointCommand) -> Array:
         """Returns the torques (6, 3) of the servos' model that no load explains [N m]."""
@@ -81,13 +81,13 @@ class Health(Stateful):
         """
         excess = self._unexplained(angle, force, command) / self.most
         size, before = np.abs(excess), angle if self.angle is None else self.angle
-        rests = np.abs(angle - before) < STILL * self.period
+        rests = np.abs(angle - before) < STILL_SPEED * self.period
         self.still = np.where(rests, self.still + self.period, 0.0)
         self.angle = angle.copy()
-        sign = np.where(size > STRANGE, np.sign(excess), 0.0)
+        sign = np.where(size > STRANGE_SHARE, np.sign(excess), 0.0)
         same = np.where(sign * self.strange > 0.0, self.strange, 0.0)
         self.strange = same + sign * self.period
-        self.proof = np.where(size < SOUND, self.proof + self.period, 0.0)
+        self.proof = np.where(size < SOUND_SHARE, self.proof + self.period, 0.0)
         failed = np.abs(self.strange) > STRANGE_TIME
         self.locked = np.where(self.faulty, self.locked, self.still > STRANGE_TIME)
         self.faulty = (self.faulty & (self.proof < PROOF_TIME)) | failed

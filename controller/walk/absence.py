@@ -19,15 +19,15 @@ from hexapod_cosim.controller.walk.gait import PATTERNS, Gait
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 
 MOST_ABSENT = 2  # legs: four must walk
-SWIFT, LOW = 0.6, 0.6  # 1    swing time and step height without a leg over those of the gait
+SWIFT, LOW_STEP = 0.6, 0.6  # 1    swing time and step height without a leg over those of the gait
 SHIFT_TIME = 0.4  # s    in which the torso moves over the other feet
 BACK_TIME = 3.0  # s    in which the walk then takes the torso back to its path
-FAR_SHIFT = 0.08  # m    at most
+FAR_SHIFT = 0.045  # m    at most
 FOLD_SPEED = 4.0  # rad/s
 LEAD = 0.15  # rad    of a command before its joint, at most
-LIMP = 0.25  # rad    from its place, at which a faulty joint has another one
-MARGIN = 0.1  # rad    of a folded joint from its limit
-TRIAL, TRIAL_TIME = 0.08, 1.0  # rad, s    size and period of the swing of a faulty joint
+LIMP_WAY = 0.25  # rad    from its place, at which a faulty joint has another one
+FOLD_MARGIN = 0.1  # rad    of a folded joint from its limit
+TRIAL_SWING, TRIAL_TIME = 0.08, 1.0  # rad, s    size and period of the swing of a faulty joint
 ARRIVED = 1e-3  # rad    a command this near to the plan is the plan
 
 
@@ -47,7 +47,7 @@ def gait_without(gait: Gait, absent: Mask, *, backwards: bool) -> Gait:
         period=count * swing,
         duty=(count - 1) / count,
         offsets=tuple(offsets.tolist()),
-        step_height=LOW * gait.step_height,
+        step_height=LOW_STEP * gait.step_height,
         touchdown_speed=gait.touchdown_speed,
     )
 
@@ -60,11 +60,10 @@ def folded(legs: LegSolver, faulty: Mask, locked: Mask) -> Array:
 
     faulty, locked: (6, 3) servos that do not work, and of these the ones that do not move.
     """
+    low, high = legs.angle_min + FOLD_MARGIN, legs.angle_max - FOLD_MARGIN
     pose = legs.stance.copy()
-    pose[:, 1] = legs.angle_max[:, 1] - MARGIN
-    tibia = (
-        np.where(locked[:, 1], legs.angle_min[:, 2], legs.angle_max[:, 2] - 2.0 * MARGIN) + MARGIN
-    )
+    pose[:, 1] = high[:, 1]
+    tibia = np.where(locked[:, 1], low[:, 2], high[:, 2])
     pose[:, 2] = np.where(faulty[:, 1], tibia, pose[:, 2])
     return pose
 
@@ -158,10 +157,10 @@ class Absence(Stateful):
         angle: (6, 3) measured [rad]; health: of the servos.
         """
         faulty, lost = health.faulty, health.lost
-        swing = TRIAL * math.sin(math.tau * self.trial * self.period / TRIAL_TIME)
+        swing = TRIAL_SWING * math.sin(math.tau * self.trial * self.period / TRIAL_TIME)
         self.trial += 1
         target = folded(self.solver, faulty, health.locked)
-        moved = (np.abs(angle - self.place) > LIMP) & self.legs[:, None]
+        moved = (np.abs(angle - self.place) > LIMP_WAY) & self.legs[:, None]
         self.place = np.where(moved, angle, self.place)
         target = np.where(faulty, self.place + swing, target)
         target = np.where(lost[:, None], target, out.angle_ref)
