@@ -128,8 +128,8 @@ def test_the_report_says_how_the_controls_walk_when_they_differ() -> None:
         "compliant": walk().as_facts(),
     }
     assert gait_differences(facts) == [
-        "kinematic walks tripod, period 1 s, the robot file's stance, chosen by the robot file",
-        "compliant walks amble, period 1.5 s, feet 20 mm nearer to the hips and 19 mm deeper below "
+        "kinematic: tripod, period 1 s, the robot file's stance, chosen by the robot file",
+        "compliant: amble, period 1.5 s, feet 20 mm nearer to the hips and 19 mm deeper below "
         "them, chosen by the control",
     ]
     assert gait_differences({"a": facts["kinematic"], "b": facts["kinematic"]}) == []
