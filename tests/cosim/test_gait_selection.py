@@ -39,10 +39,13 @@ def test_where_nothing_is_named_compliant_control_ambles_nearer_to_the_hips() ->
     assert chosen.gait.narrowing == pytest.approx(0.02997)
 
 
-@pytest.mark.parametrize("control", ["kinematic", "paper", "law.py:Mine"])
-def test_all_other_controls_walk_as_the_robot_file_says(control: str) -> None:
+@pytest.mark.parametrize(
+    ("control", "by"),
+    [("kinematic", "robot file"), ("paper", "robot file"), ("law.py:Mine", "own controller")],
+)
+def test_all_other_controls_walk_as_the_robot_file_says(control: str, by: str) -> None:
     plain = walk(control=control)
-    assert (plain.gait.name, plain.stance, plain.chosen_by) == ("tripod", "own", "robot file")
+    assert (plain.gait.name, plain.stance, plain.chosen_by) == ("tripod", "own", by)
     assert plain.robot == ATHENA
 
 
