@@ -99,9 +99,10 @@ def select_gait(
     settings = dict(scenario.settings.get("gait", {}))
     plain = GaitSelection(robot=robot, gait=make_gait(robot, **settings), stance=OWN)
     if scenario.stance != CHOSEN:
-        if scenario.names_walk:
-            return _named(scenario, plain, bare)
         control = control_of(scenario.control)
+        if scenario.names_walk:
+            named = _named(scenario, plain, bare)
+            return named if control.is_builtin else replace(named, chosen_by=OWN_CONTROLLER)
         if control.kind == FMU and control.path is not None:
             return _of_fmu(plain, control.path)
         if not control.chooses:
