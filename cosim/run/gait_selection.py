@@ -34,7 +34,7 @@ from hexapod_cosim.cosim.design.stance import (
 )
 from hexapod_cosim.cosim.export.robot_package import SPEED
 from hexapod_cosim.cosim.results.facts import OF_FMU, OWN_CONTROLLER, GaitChoice
-from hexapod_cosim.cosim.run.designs import Stance, kept_stance
+from hexapod_cosim.cosim.run.designs import StanceChange, kept_stance
 from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.reach import reaches
 from hexapod_cosim.cosim.scenario.reading import scenario_robot
@@ -189,7 +189,7 @@ def _chosen(
 def _narrowing(
     walk: GaitSelection,
     begin: GaitSelection,
-    design: Stance,
+    design: StanceChange,
     plain: GaitSelection,
     commands: Sequence[Command],
 ) -> GaitSelection:
@@ -248,16 +248,16 @@ def _designed_for(gains: Gains | None, own: Robot, chosen: Robot) -> bool:
 
 
 @lru_cache(maxsize=64)
-def _design(robot: Robot, gait: Gait) -> Stance:
+def _design(robot: Robot, gait: Gait) -> StanceChange:
     """Returns the stance of least heat of a robot file, designed once and kept in the user's
     cache.
     """
     return kept_stance(robot, gait, _found)
 
 
-def _found(robot: Robot, gait: Gait) -> Stance:
+def _found(robot: Robot, gait: Gait) -> StanceChange:
     design = find_stance(robot, gait=gait)
-    return Stance(design.outward, design.deeper)
+    return StanceChange(design.outward, design.deeper)
 
 
 def known_robot(scenario: Scenario) -> Robot:

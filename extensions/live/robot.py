@@ -26,12 +26,11 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_block import StepError
 from hexapod_cosim.cosim.master.loop import JointController, macro_step
 from hexapod_cosim.cosim.master.sensors import errors_of
-from hexapod_cosim.cosim.master.signals import Signals
+from hexapod_cosim.cosim.master.signals import SERVOS, Signals
 from hexapod_cosim.cosim.results.window import robot_weight
 from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
 from hexapod_cosim.cosim.run.plant import PlantFmus, apply_settings, initialise_plant
 from hexapod_cosim.cosim.scenario.controls import control_of
-from hexapod_cosim.cosim.scenario.schedule import healthy_servos
 from hexapod_cosim.extensions.live.messages import Change
 from hexapod_cosim.extensions.live.recording import Force
 from hexapod_cosim.extensions.live.settings import (
@@ -136,20 +135,20 @@ class LiveRobot(Closing):
         self.weight = robot_weight(self.parameters)
         self.signals = Signals(self._plant, errors=errors_of(scenario, self.plan.schedule))
         self.signals.read()
-        self._servos = healthy_servos()
+        self._servos = np.zeros(len(SERVOS))
         self._last = JointCommand(angle_ref=self.signals.measurement.angle.copy())
         self._start_controller()
 
     def toggle_leg(self, leg: int) -> str:
         """Makes all servos of a leg limp, or healthy again; returns which, in a sentence."""
-        strength = self._servos[: LEGS * JOINTS].reshape(LEGS, JOINTS)
-        strength[leg] = 1.0 - strength[leg]
-        return f"Leg {LEG_NAMES[leg]} {'works again' if strength[leg, 0] else 'is limp'}."
+        weakness = self._servos[: LEGS * JOINTS].reshape(LEGS, JOINTS)
+        weakness[leg] = 1.0 - weakness[leg]
+        return f"Leg {LEG_NAMES[leg]} {'is limp' if weakness[leg, 0] else 'works again'}."
 
     @property
     def limp(self) -> tuple[int, ...]:
         """The legs that are limp."""
-        return tuple(np.flatnonzero(self._servos[: LEGS * JOINTS : JOINTS] == 0.0).tolist())
+        return tuple(np.flatnonzero(self._servos[: LEGS * JOINTS : JOINTS]).tolist())
 
     def change(self, change: Change) -> None:
         """Begins a change of the settings. Raises HexapodError, and then leaves all as it was."""

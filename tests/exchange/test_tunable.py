@@ -96,13 +96,13 @@ def test_model_exchange_tunes_in_event_mode_and_reports_states_that_moved(
         assert moved[0] == pytest.approx(COM - start, rel=1e-6)
         assert np.max(np.abs(moved[1:])) < 1e-6
         # a lock is an event as well; the joint's torque then holds it
-        assert plant.set_reals({"LF.femur.lock": 1.0, "LF.femur.strength": 0.0}) == OK
+        assert plant.set_reals({"LF.femur.lock": 1.0, "LF.femur.weakness": 1.0}) == OK
         assert plant.call("fmi2NewDiscreteStates", info) == OK
         assert changed.value == 1
         assert plant.real("LF.femur.torque") == 0.0
 
 
-@pytest.mark.parametrize(("name", "value"), [("LF.femur.strength", 1.01), ("LF.coxa.lock", -0.1)])
+@pytest.mark.parametrize(("name", "value"), [("LF.femur.weakness", 1.01), ("LF.coxa.lock", -0.1)])
 def test_faults_out_of_range_are_refused(plant: Plant, name: str, value: float) -> None:
     plant.initialize()
     assert plant.set_reals({name: value}) == ERROR
@@ -114,12 +114,12 @@ def test_a_locked_and_a_limp_leg_are_the_same_in_both_standards(
 ) -> None:
     plant.initialize()
     plant3.initialize()
-    lock, strength = np.zeros((6, 3)), np.ones((6, 3))
-    lock[0], strength[1] = 1.0, 0.0
+    lock, weakness = np.zeros((6, 3)), np.zeros((6, 3))
+    lock[0], weakness[1] = 1.0, 1.0
     joints = [f"{leg}.{joint}" for leg in ("LF", "LM") for joint in ("coxa", "femur", "tibia")]
     assert plant.set_reals({f"{joint}.lock": 1.0 for joint in joints[:3]}) == OK
-    assert plant.set_reals({f"{joint}.strength": 0.0 for joint in joints[3:]}) == OK
-    assert plant3.set({"lock": lock, "strength": strength}) == OK
+    assert plant.set_reals({f"{joint}.weakness": 1.0 for joint in joints[3:]}) == OK
+    assert plant3.set({"lock": lock, "weakness": weakness}) == OK
     angle = plant.real("LM.femur.angle")
     for k in range(40):
         assert plant.step(k * H, H) == OK

@@ -147,7 +147,7 @@ HX_API int hx_page_advance(int count, double vx, double vy, double yaw_rate, dou
 HX_API int hx_page_leg(int leg) {
   if (leg < 0 || leg >= HX_LEGS) return HX_INVALID_ARGUMENT;
   for (int joint = 0; joint < HX_JOINTS; ++joint)
-    input.strength[leg][joint] = 1.0 - input.strength[leg][joint];
+    input.weakness[leg][joint] = 1.0 - input.weakness[leg][joint];
   return HX_OK;
 }
 

@@ -35,7 +35,7 @@ typedef struct {
 static inline hxPower hx_power_of(const hxCommand *command, int joint, int slot) {
   const hxReal supply = hx_splat(command->supply);
   return (hxPower){supply, supply * hx_load(&command->duty[joint][slot]),
-                   hx_load(&command->strength[joint][slot])};
+                   1.0 - hx_load(&command->weakness[joint][slot])};
 }
 
 /* Returns the torque and the limits of a motor whose voltage is limited (eq. 48). The back-EMF

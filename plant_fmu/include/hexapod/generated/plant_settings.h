@@ -386,9 +386,9 @@ typedef struct hxInput {
   /* rad/s2  Commanded acceleration, of the kinematic mode alone: speed_ref changes by it within a
    * communication step */
   double acceleration_ref[6][3];
-  /* 1  Share of its torque that the servo can give: 1 healthy, 0 limp; no effect in kinematic mode
+  /* 1  Share of its torque that the servo has lost: 0 healthy, 1 limp; no effect in kinematic mode
    * */
-  double strength[6][3];
+  double weakness[6][3];
   /* 1  From 0.5 on the joint is locked at its angle when the step begins; no effect in kinematic
    * mode */
   double lock[6][3];
