@@ -18,9 +18,8 @@ import numpy as np
 from hexapod_cosim.controller.comply.compliant import Compliant, PresentStep, sense
 from hexapod_cosim.controller.comply.paper import Paper, Step
 from hexapod_cosim.controller.comply.posture import LEVEL
-from hexapod_cosim.controller.gains import Gains
+from hexapod_cosim.controller.gains import Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plan import WalkPlan
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, rows_of
 from hexapod_cosim.controller.sense.health import Health

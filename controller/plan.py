@@ -16,8 +16,8 @@ import numpy as np
 
 from hexapod_cosim.controller.comply.compliant import Compliant
 from hexapod_cosim.controller.comply.posture import Posture
+from hexapod_cosim.controller.gains import Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, cis, rows_of
 from hexapod_cosim.controller.planned_step import PlannedStep, StepPlanner
 from hexapod_cosim.controller.signals import JointCommand

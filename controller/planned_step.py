@@ -12,7 +12,7 @@ import numpy as np
 from hexapod_cosim.controller.comply.compliant import Compliant
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.comply.sway import Sway
-from hexapod_cosim.controller.parts import Parts
+from hexapod_cosim.controller.gains import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis
 from hexapod_cosim.controller.walk.absence import Absence
 from hexapod_cosim.controller.walk.foot_paths import PlannedFeet

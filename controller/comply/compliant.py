@@ -24,9 +24,8 @@ from hexapod_cosim.controller.comply.load_plan import LoadPlan, plan_load
 from hexapod_cosim.controller.comply.planned_squeeze import PlannedSqueeze
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.comply.support import Support
-from hexapod_cosim.controller.gains import Gains
+from hexapod_cosim.controller.gains import Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, cis, clamp
 from hexapod_cosim.controller.sense.load_adaptation import LoadAdaptation
 from hexapod_cosim.controller.signals import JointCommand, Measurement

@@ -142,13 +142,16 @@ def _loop(
 ) -> None:
     """Runs all macro-steps; the last row, at the end of the run, is followed by no step."""
     pushes, lost, measurement = schedule.pushes, schedule.lost, signals.measurement
-    servos = schedule.servos
+    servos, tunings = schedule.servos, list(reversed(schedule.tunings))
     signals.read()
     for k, (t, command) in enumerate(zip(schedule.times.tolist(), schedule.commands, strict=False)):
         if pushes is not None:
             signals.push[:] = pushes[k]
         if servos is not None:
             signals.set_servos(servos[k])
+        while tunings and tunings[-1][0] == k:
+            _, name, value = tunings.pop()
+            plant.set_parameters({name: value})
         watch.call = k + 1
         joints = controller.step(t, command, measurement)
         watch.call = 0
