@@ -117,11 +117,12 @@ class WalkPlan(Stateful):
     def _waits(self) -> bool:
         """Returns whether the gait clock waits for feet at the ends of their swings (C50).
 
-        Without a leg, a foot may have no load to carry: it need only touch the ground.
+        It does not without a leg, because a foot may then have no load to carry.
         """
         clock = self.paths.clock
-        held = clock.held and not clock.absent.any()
-        return self.laws is not None and self.laws.laws.waits(clock.landing(self.at), held=held)
+        if self.laws is None or clock.absent.any():
+            return False
+        return self.laws.laws.waits(clock.landing(self.at), held=clock.held)
 
     def _plan_afresh(self, *, waiting: bool) -> None:
         """Begins a new section at the present step, and plans the step after it.

@@ -3,7 +3,8 @@
 A foot that meets the ground before its path ends keeps the height of its contact through its
 stance. A foot that finds no ground at the end of its path moves down at a fixed speed to a limit.
 In the next swing these offsets decay.
-A foot for which the gait clock waits searches at the same speed (C50).
+A foot for which the gait clock waits reaches this speed slowly (C50): a force that is known late
+must not let a foot that stands push the torso up.
 A foot whose sensor is doubted follows its path: what its sensor said, or did not say, was the
 reason for its offset, which decays at once.
 
@@ -29,6 +30,7 @@ REACH_SPEED = 0.08  # m/s    downwards
 REACH_LIMIT = 0.040  # m
 HOLD_LIMIT = 0.030  # m    upwards: the robots' step height
 GRACE = 0.040  # s    after the planned touch-down, in which a foot may be late
+PATIENCE = 0.060  # s    of the gait clock, in which a foot that it waits for begins to move down
 RETURN_TIME = 0.060  # s    time constant with which an offset vanishes in the swing, or in doubt
 NEGLIGIBLE = 1e-5  # m    a smaller offset is set to 0
 
@@ -39,9 +41,10 @@ class Touchdown(Stateful):
     Attributes, (6,) each:
         offset: distance by which the path is raised [m].
         late: time without contact since the planned touch-down [s].
+        waited: time for which the gait clock has waited for it [s].
     """
 
-    STATE = ("offset", "late")
+    STATE = ("offset", "late", "waited")
 
     def __init__(self, *, period: float) -> None:
         self.period = period
@@ -49,7 +52,7 @@ class Touchdown(Stateful):
 
     def reset(self) -> None:
         """Sets the height offsets of all feet to zero."""
-        self.offset, self.late = np.zeros((2, LEGS))
+        self.offset, self.late, self.waited = np.zeros((3, LEGS))
 
     def busy(self) -> bool:
         """Returns whether some foot has an offset or lacks its planned contact."""
@@ -62,7 +65,9 @@ class Touchdown(Stateful):
 
     def _moved(self, touching: Mask, falling: Array, swinging: Mask, searching: Mask) -> Array:
         """Returns the next offsets (6,) [m]. Arguments are those of step()."""
-        reached = np.maximum(self.offset - REACH_SPEED * self.period, -REACH_LIMIT)
+        eager = np.minimum(self.waited / PATIENCE, 1.0)
+        pace = REACH_SPEED * np.where(self.late > GRACE, 1.0, eager * eager)
+        reached = np.maximum(self.offset - pace * self.period, -REACH_LIMIT)
         held = np.minimum(self.offset + falling, HOLD_LIMIT)
         in_swing = np.where(touching, np.where(falling > 0.0, held, self.offset), self._faded())
         moved = np.where(swinging, in_swing, self.offset)
@@ -89,6 +94,7 @@ class Touchdown(Stateful):
             doubted: (6,) feet whose sensors are not trusted.
         """
         self.late = np.where(loaded & ~touching & ~doubted, self.late + self.period, 0.0)
+        self.waited = np.where(searching, self.waited + self.period, 0.0)
         moved = self._moved(touching, falling, swinging, searching)
         self.offset = np.where(doubted, self._faded(), moved)
 

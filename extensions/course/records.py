@@ -36,8 +36,11 @@ CLASSES = (
     "payload",
     "servos",
     "sensors",
+    "late",
     "pushes",
+    "loss",
     "commands",
+    "fast",
     "robots",
 )
 JUDGE, TUNE = SPLITS = ("judge", "tune")

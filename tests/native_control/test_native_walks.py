@@ -14,6 +14,7 @@ from native_walks import ALL_PARTS, STEPS, Ground, close, differences, setup_of,
 
 from hexapod_cosim.controller import (
     SWITCHES,
+    BodyCommand,
     Controller,
     Gait,
     Measurement,
@@ -58,6 +59,31 @@ def test_a_walk_that_changes_its_gait_is_the_same(
     )
     assert close(worst)
     assert not fallback.any()
+
+
+@pytest.mark.parametrize("law", ["compliant", "paper"])
+def test_a_walk_that_loses_two_legs_and_takes_them_back_is_the_same(
+    controller_core: ct.CDLL, law: str
+) -> None:
+    """The joints of LF and RR rest for a time; the others follow their commands."""
+    rests = {0: range(300, 500), 5: range(420, 560)}
+    absent: set[tuple[bool, ...]] = set()
+
+    def sense(controller: Controller, step: int, measurement: Measurement) -> None:
+        resting = measurement.angle.copy()
+        measurement.angle[:] = controller._out.angle_ref
+        for leg, steps in rests.items():
+            if step in steps:
+                measurement.angle[leg] = resting[leg]
+        measurement.foot_force[:, 2] = 9.0 * ~controller.diagnostics.swinging
+        absent.add(tuple(controller.diagnostics.absent.tolist()))
+
+    setup = replace(setup_of(), law=law)
+    straight = BodyCommand(vx=0.06)
+    worst, _ = differences(controller_core, setup, sense=sense, steps=1200, told=lambda _: straight)
+    assert close(worst)
+    alone, both, none = (True, *5 * (False,)), (True, *4 * (False,), True), 6 * (False,)
+    assert {none, alone, both} <= absent
 
 
 PAPER_PARTS = ("paper_share", "paper_pid", "paper_suspension")

@@ -101,16 +101,17 @@ static inline void follow_sensors(const hxWalkPlanModel *model, const hxComplian
   if (hx_command_ramp_moves(&plan->ramp)) paths->narrowing = laws->adaptation.narrowing;
 }
 
-/* Returns whether the gait clock waits for feet at the ends of their swings (C50). Without a leg, a
- * foot may have no load to carry: it need only touch the ground. */
+/* Returns whether the gait clock waits for feet at the ends of their swings (C50). It does not
+ * without a leg, because a foot may then have no load to carry. */
 static inline int waits(const hxWalkPlanModel *model, const hxCompliant *laws,
                         const hxWalkPlan *plan) {
   const hxGaitClock *clock = &plan->paths.clock;
-  int landing[HX_LEGS], held = clock->held;
+  int landing[HX_LEGS];
   if (!model->planner.compliant) return 0;
-  for (int k = 0; k < HX_LEGS; ++k) held &= !clock->absent[k];
+  for (int k = 0; k < HX_LEGS; ++k)
+    if (clock->absent[k]) return 0;
   hx_gait_clock_landing(&model->paths.clock, clock, plan->at, landing);
-  return hx_compliance_waits(&model->planner.laws.laws, landing, held, &laws->laws);
+  return hx_compliance_waits(&model->planner.laws.laws, landing, clock->held, &laws->laws);
 }
 
 /* Begins a new section at the present step, and plans the next step. waiting: the gait clock stands

@@ -10,6 +10,7 @@
 typedef struct hxTouchdown {
   double offset[HX_LEGS]; /* m, by which the paths are raised */
   double late[HX_LEGS];   /* s, for how long the ground has been missing */
+  double waited[HX_LEGS]; /* s, for how long the gait clock has waited for the foot */
 } hxTouchdown;
 
 /* m, a foot that meets the ground earlier on its way down has met it early */
@@ -19,6 +20,8 @@ static const double reach_speed = 0.08;     /* m/s  downwards */
 static const double hold_limit = 0.030;     /* m, upwards: the largest step height of the robots */
 /* s, delay after the planned touch-down that is tolerated */
 static const double grace = 0.040;
+/* s, of the gait clock, in which a foot that it waits for begins to move down */
+static const double patience = 0.060;
 static const double return_time = 0.060; /* s, in which an offset decays in the swing */
 static const double negligible = 1e-5;   /* m, a smaller offset is set to 0 */
 
@@ -35,10 +38,13 @@ static inline double faded(double offset, double period) {
   return fabs(offset) > negligible ? offset * hx_decay(-period / return_time) : 0.0;
 }
 
-/* Returns the next offset of a foot that has missed the ground for a time [s]. */
-static inline double moved(double offset, double late, double period, int touching, double falling,
-                           int swinging, int searching) {
-  if (searching || late > grace) return fmax(offset - reach_speed * period, -hx_reach_limit);
+/* Returns the next offset of a foot that has missed the ground for a time, and for which the gait
+ * clock has waited [s]. */
+static inline double moved(double offset, double late, double waited, double period, int touching,
+                           double falling, int swinging) {
+  const double eager = fmin(waited / patience, 1.0),
+               pace = reach_speed * (late > grace ? 1.0 : eager * eager);
+  if (waited > 0.0 || late > grace) return fmax(offset - pace * period, -hx_reach_limit);
   if (swinging && touching && falling > 0.0) return fmin(offset + falling, hold_limit);
   if (swinging && !touching) return faded(offset, period);
   return offset;
@@ -56,10 +62,11 @@ static inline void hx_touchdown_step(double period, const int touching[HX_LEGS],
     const int misses = loaded[leg] && !touching[leg] && !doubted[leg];
     const double offset = touchdown->offset[leg];
     touchdown->late[leg] = misses ? touchdown->late[leg] + period : 0.0;
+    touchdown->waited[leg] = searching[leg] ? touchdown->waited[leg] + period : 0.0;
     touchdown->offset[leg] = doubted[leg]
                                  ? faded(offset, period)
-                                 : moved(offset, touchdown->late[leg], period, touching[leg],
-                                         falling[leg], swinging[leg], searching[leg]);
+                                 : moved(offset, touchdown->late[leg], touchdown->waited[leg],
+                                         period, touching[leg], falling[leg], swinging[leg]);
   }
 }
 
