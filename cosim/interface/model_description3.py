@@ -26,7 +26,7 @@ from hexapod_cosim.cosim.interface.model_description import (
     stated,
     typed_attributes,
 )
-from hexapod_cosim.cosim.interface.records import Interface
+from hexapod_cosim.cosim.interface.records import Interface, Variable
 
 # capabilities, each tested by tests/fmi/test_fmi3.py
 CAPABILITIES = {
@@ -34,17 +34,20 @@ CAPABILITIES = {
     "canBeInstantiatedOnlyOncePerProcess": "false",
     "canGetAndSetFMUState": "true",
     "canSerializeFMUState": "true",
-    "providesAdjointDerivatives": "false",
     "providesPerElementDependencies": "false",
 }
 MODEL_EXCHANGE = {"needsCompletedIntegratorStep": "true", "providesEvaluateDiscreteStates": "false"}
 CO_SIMULATION = {
     "canHandleVariableCommunicationStepSize": "true",
-    "providesIntermediateUpdate": "false",
-    "canReturnEarlyAfterIntermediateUpdate": "false",
     "providesEvaluateDiscreteStates": "false",
 }
-EVENTS = ("hasEventMode", "mightReturnEarlyFromDoStep")  # of components with events
+# of components with events and steps of their own
+EVENTS = (
+    "hasEventMode",
+    "mightReturnEarlyFromDoStep",
+    "providesIntermediateUpdate",
+    "canReturnEarlyAfterIntermediateUpdate",
+)
 TYPES = {
     "Real": "Float64",
     "Enumeration": "Enumeration",
@@ -104,7 +107,8 @@ def _add_interfaces(root: Element, interface: Interface) -> None:
     has_states = bool(interface.states)
     differentiable = has_states and interface.directional_derivatives
     both = {"modelIdentifier": interface.component.identifier} | CAPABILITIES
-    both |= {"providesDirectionalDerivatives": "true" if differentiable else "false"}
+    for kind in ("Directional", "Adjoint"):
+        both[f"provides{kind}Derivatives"] = "true" if differentiable else "false"
     if has_states:
         SubElement(root, "ModelExchange", both | MODEL_EXCHANGE)
     events = dict.fromkeys(EVENTS, "true" if has_states else "false")
@@ -178,10 +182,17 @@ def _add_variable(
         "start": _starts(array),
         "derivative": derivative_of,
         "reinit": "true" if first.name in interface.reinitialised else None,
+        "intermediateUpdate": "true" if _is_intermediate(first, interface) else None,
     }
     element = SubElement(parent, TYPES[first.type], stated(attributes))
     for size in array.shape:
         SubElement(element, "Dimension", start=str(size))
+
+
+def _is_intermediate(variable: Variable, interface: Interface) -> bool:
+    """Returns whether importers may read or set a variable at steps of the solver."""
+    continuous = variable.variability == "continuous" and variable.type == "Real"
+    return bool(interface.states) and continuous and variable.causality in ("input", "output")
 
 
 def _starts(array: Array) -> str | None:

@@ -273,13 +273,14 @@ enum { HX_MEASURED_LINES = offsetof(hxMeasured, contact_loss) / (HX_SLOTS * size
 
 typedef struct hxState {
   double time;
-  double next_step;       /* s  step that the error control proposes next */
-  double first_step;      /* s  the same for a call's first step, with new inputs */
-  double stored_at_start; /* J  stored energy at the start of the energy audit */
-  double parameter_work;  /* J  given by changes of parameters since */
-  double call_start;      /* s  start of the call that an event interrupted */
-  double call_input;      /* 1  checksum of its input, a whole number; 0: no such call */
-  double supply;          /* 1  hxCommand.supply and duty of the last call */
+  double next_step;        /* s  step that the error control proposes next */
+  double first_step;       /* s  the same for a call's first step, with new inputs */
+  double stored_at_start;  /* J  stored energy at the start of the energy audit */
+  double parameter_work;   /* J  given by changes of parameters since */
+  double call_start;       /* s  start of the call that an event interrupted */
+  double call_input;       /* 1  checksum of its input, a whole number; 0: no such call */
+  double call_evaluations; /* 1  evaluations before the last call began */
+  double supply;           /* 1  hxCommand.supply and duty of the last call */
   double duty[HX_JOINTS][HX_SLOTS];
   double locked[HX_JOINTS][HX_SLOTS]; /* 1    1: the joint is locked */
   double held[HX_JOINTS][HX_SLOTS];   /* rad  where it was locked */
