@@ -19,6 +19,7 @@ from hexapod_cosim.cosim.interface.names import (
     joint_names,
     vector_names,
 )
+from hexapod_cosim.cosim.master.connection import FLAGS
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.metric_table import METRICS, PER_RADIAN
 from hexapod_cosim.cosim.results.support import body_height, real_feet, stability_margins
@@ -63,11 +64,7 @@ _JUDGED = (
     *MEASURED_BY_PLANT,
     *_each(foot_names, "normal_force", "tangential_force", "slip_speed", "contact"),
     *foot_vector_names("position"),
-    *(
-        f"controller.{leg}.{flag}"
-        for flag in ("swinging", "unreachable", "fallback")
-        for leg in LEG_NAMES
-    ),
+    *(f"controller.{leg}.{flag}" for flag in FLAGS for leg in LEG_NAMES),
     *PLANNED,
 )
 _JUDGED_BRISTLES = _each(foot_vector_names, "velocity", "bristle")
