@@ -158,14 +158,6 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
 ]
 
 
-def test_static_friction_is_refused_without_friction(core: ct.CDLL) -> None:
-    plant = midway(core)
-    start = definition(plant.robot)
-    start.friction.law, start.friction.mu_static = 2, 0.8
-    message = r"friction\.mu_static: got 0\.8, expected 0 or friction\.mu with friction\.law none"
-    refused(plant, lambda: plant.reset(start), INVALID_MODEL, message)
-
-
 def test_a_foot_deeper_than_its_radius_at_the_start_is_refused_with_its_name(
     core: ct.CDLL,
 ) -> None:
