@@ -27,7 +27,7 @@ export class LocalLoop extends Listeners implements Connection {
     super();
     const { first: settings } = setup;
     const { limits } = setup.walks[settings.gait];
-    const flags = { stopped: true, paused: false, recording: false, recorded: false };
+    const flags = { stopped: true, paused: true, recording: false, recorded: false };
     this.status = { ...flags, settings, wanted: settings, limits, fault: "" };
     setTimeout(() => {
       this.emit("world", setup.world);
