@@ -146,8 +146,8 @@ def add_units(root: Element, units: Iterable[Unit]) -> None:
 
 
 def _add_types(root: Element, interface: Interface) -> None:
-    """Adds the types of units and enumerations."""
-    parent = SubElement(root, "TypeDefinitions")
+    """Adds the types of units and enumerations, if there are any: the list must not be empty."""
+    parent = Element("TypeDefinitions")
     for unit in interface.units:
         _add_real_type(parent, unit)
     for enumeration in interface.enumerations.values():
@@ -155,6 +155,7 @@ def _add_types(root: Element, interface: Interface) -> None:
         element = SubElement(SubElement(parent, "SimpleType", facts), "Enumeration")
         for number, (name, text) in enumerate(enumeration.items, start=1):
             SubElement(element, "Item", name=name, value=str(number), description=text)
+    root.extend([parent] if len(parent) else [])
 
 
 def about_unit(unit: Unit) -> str:

@@ -121,7 +121,7 @@ def _add_interfaces(root: Element, interface: Interface) -> None:
 
 def _add_types(root: Element, interface: Interface) -> None:
     """Adds the types of enumerations and units."""
-    parent = SubElement(root, "TypeDefinitions")
+    parent = Element("TypeDefinitions")
     for enumeration in interface.enumerations.values():
         facts = {"name": enumeration.name, "description": about_type(enumeration, interface)}
         element = SubElement(parent, "EnumerationType", facts)
@@ -137,6 +137,7 @@ def _add_types(root: Element, interface: Interface) -> None:
                 | {"quantity": unit.type, "unit": unit.name}
                 | display,
             )
+    root.extend([parent] if len(parent) else [])
 
 
 def _add_variables(root: Element, interface: Interface, variables: Iterable[Array]) -> None:

@@ -14,10 +14,9 @@ from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.locomotion import fallback_columns
 from hexapod_cosim.cosim.results.summary import FIX, UNBALANCED
 from hexapod_cosim.cosim.results.support import ground_normal
-from hexapod_cosim.cosim.results.window import LEAST_DISTANCE, SKIPPED_CYCLES, View
-from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, Robot
-from hexapod_cosim.models.friction import BRISTLE_LAWS
+from hexapod_cosim.cosim.results.window import LEAST_DISTANCE, SKIPPED_CYCLES, View, friction_law
+from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
+from hexapod_cosim.models import LEG_NAMES, Robot
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.records import SELF_CONTACTS, Foot, Servo
 from hexapod_cosim.models.soil.law import soil_radius
@@ -49,10 +48,10 @@ def fallback_warnings(recording: Recording) -> list[str]:
 
 def friction_warnings(parameters: Mapping[str, float]) -> list[str]:
     """Warns where friction is too weak for the robot to stay in place or to move forward."""
-    law = FRICTION_LAWS[round(parameters["friction.law"]) - 1]
-    mu = 0.0 if law == "none" else parameters["friction.mu"]
+    law = friction_law(parameters)
+    mu = parameters["friction.mu"] if law.has_friction else 0.0
     gravity = np.array([parameters[name] for name in vector_names("gravity")])
-    static = parameters.get("friction.mu_static", 0.0) if law in BRISTLE_LAWS else 0.0
+    static = parameters.get("friction.mu_static", 0.0) if law.has_bristles else 0.0
     slide = float(np.linalg.norm(sliding(gravity, ground_normal(parameters), mu, static)))
     if slide:
         why = "without friction" if mu == 0.0 else f"which friction (mu = {mu:g}) does not hold"
@@ -77,6 +76,8 @@ def unused_settings(scenario: Scenario, robot: Robot) -> list[str]:
         for command in scenario.commands
         if command.time >= end
     ]
+    if scenario.gains and scenario.control == CONTROLS[0]:
+        found.append(f"[gains] does nothing: {CONTROLS[0]} control has none")
     kind = scenario.settings.get("terrain", {}).get("kind", robot.terrain.name)
     given = {**scenario.settings.get("terrain", {}), **scenario.parameters}
     sloped = [

@@ -35,9 +35,12 @@ SAME = 1e-9  # relative, of a parameter that was printed and read again
 
 @lru_cache(maxsize=MAX_FMUS)
 def _content(robot: Robot, _binary: Path, _changed: int) -> bytes:
-    """Returns the plant FMU of a robot with a binary, which was changed at that time [ns]."""
+    """Returns the plant FMU of a robot with a binary, which was changed at that time [ns].
+
+    It holds what a run reads, without documentation, pictures and sources.
+    """
     with TemporaryFolder("export") as folder:
-        return export_fmu(robot, folder / f"{robot.name}.fmu").read_bytes()
+        return export_fmu(robot, folder / f"{robot.name}.fmu", bare=True).read_bytes()
 
 
 class PlantFmus:

@@ -44,7 +44,6 @@ from hexapod_cosim.cosim.run.single_run import make_result, simulate, start_cont
 from hexapod_cosim.cosim.scenario.controls import FMU, PYTHON, control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, Robot
-from hexapod_cosim.models.friction import BRISTLE_LAWS
 
 MAX_SETTINGS = 64  # robots whose settings are kept
 
@@ -216,9 +215,7 @@ class Runner(Closing):
 
     def _columns(self, plan: RunPlan) -> tuple[str, ...] | None:
         """Returns the columns to record; None for all."""
-        bristles = (
-            plan.robot.friction.law in BRISTLE_LAWS or "friction.law" in plan.scenario.parameters
-        )
+        bristles = plan.robot.friction.has_bristles or "friction.law" in plan.scenario.parameters
         return None if self._everything else metric_columns(bristles=bristles)
 
     def _controller_for(self, plan: RunPlan) -> Fmu:

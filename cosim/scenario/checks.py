@@ -18,6 +18,7 @@ from hexapod_cosim.cosim.scenario.records import (
     Sensors,
     Variation,
 )
+from hexapod_cosim.cosim.scenario.sections import GAINS
 from hexapod_cosim.models import Robot, ScenarioError, load_robot, nearest_name
 from hexapod_cosim.models.ground.table import terrain_specs
 from hexapod_cosim.models.schema import specs
@@ -158,4 +159,5 @@ def setting_names() -> list[str]:
         if section != "terrain" and key not in UNUSED.get(section, ())
     ]
     keys += [("walk", key) for key in WALK_KEYS]
+    keys += [("gains", f"{part}.{key}") for part, kind in GAINS.items() for key in specs(kind)]
     return [f"{section}.{key}" for section, key in keys]

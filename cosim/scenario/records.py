@@ -240,6 +240,8 @@ class Scenario:
     events: tuple[Event, ...] = ()
     sensors: Sensors = Sensors()
     compliance: Parts = ALL_PARTS  # active parts of the compliant control
+    # gains that replace designed ones, by part and name, as in a gains file
+    gains: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     variation: Variation | None = None  # None: the file has no such section
     outputs: Outputs = Outputs()
     parameters: Mapping[str, Any]  # further FMU parameters by name
@@ -313,6 +315,7 @@ class Scenario:
             "events": [_as_table(entry) for entry in self.events],
         }
         tail = {"sensors": _as_table(self.sensors), "compliance": _as_table(self.compliance)}
+        tail |= {"gains": {part: dict(values) for part, values in self.gains.items()}}
         tail |= {"variation": {} if self.variation is None else _as_table(self.variation)}
         tail |= {"outputs": _as_table(self.outputs), "parameters": dict(self.parameters)}
         return (
@@ -325,7 +328,17 @@ class Scenario:
 
 PLAIN_KEYS = tuple(specs(Scenario))  # title, robot, start, duration, macro_step, seed
 SECTIONS = (
-    *("command", "control", "walk", "sensors", "compliance", "variation", "outputs", "parameters"),
+    *(
+        "command",
+        "control",
+        "walk",
+        "sensors",
+        "compliance",
+        "gains",
+        "variation",
+        "outputs",
+        "parameters",
+    ),
     *SETTINGS,
 )
 KEYS = (*PLAIN_KEYS, "gravity", "events", *SECTIONS)

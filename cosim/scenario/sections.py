@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from hexapod_cosim.controller.gains import SECTIONS
 from hexapod_cosim.cosim.scenario.records import (
     GRAVITY,
     GRAVITY_VECTOR,
@@ -32,6 +33,9 @@ from hexapod_cosim.models.schema import (
 )
 from hexapod_cosim.models.servos.presets import servo_table
 from hexapod_cosim.models.soil.presets import soil_table
+
+# the parts of a gains file that a controller reads
+GAINS = {part: SECTIONS[part] for part in ("support", "hold", "limits", "paper")}
 
 
 @contextmanager
@@ -88,6 +92,14 @@ def read_commands(value: Any, where: str) -> tuple[Command, ...]:
             where=where,
         )
     return tuple(commands) if times and times[0] == 0.0 else (Command(), *commands)
+
+
+def read_gains(table: Any, where: str) -> dict[str, dict[str, Any]]:
+    """Reads [gains]: some of the gains of a gains file, by part and name."""
+    refuse_unknown_keys(expect_table(table, where), list(GAINS), where)
+    return {
+        part: read_given(GAINS[part], values, f"{where}.{part}") for part, values in table.items()
+    }
 
 
 def read_gravity(value: Any, where: str) -> tuple[float, float, float]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 from hexapod_cosim.controller.gains import SECTIONS
@@ -119,10 +118,8 @@ def _check_gain(factor: Factor, study: Study, where: str) -> None:
 
 def _check_setting(factor: Factor, study: Study, where: str) -> None:
     """Tries the values in the first scenario, and the first and last one in all others."""
-    values = list(samples(factor))
-    if len(values) > MAX_TRIED:
-        step = math.ceil(len(values) / MAX_TRIED)
-        values = [*values[::step], min(values), max(values)]
+    every = samples(factor)
+    values = [*every[:: math.ceil(len(every) / MAX_TRIED)], min(every), max(every)]
     for k, case in enumerate(study.cases.values()):
         for value in values if k == 0 else (values[0], values[-1]):
             _try(case, factor, value, where)
@@ -132,7 +129,7 @@ def _try(case: Case, factor: Factor, value: Value, where: str) -> None:
     try:
         table = with_values(case.table, {factor.name: factor.setting(value)})
         scenario = scenario_from_table(table, where=case.where, given=[factor.name])
-        check_scenario(scenario, names=(factor.name,))
+        check_scenario(scenario)
     except HexapodError as error:
         raise placed(error, where) from error
 
@@ -144,22 +141,14 @@ def placed(error: HexapodError, where: str) -> StudyError:
     )
 
 
-def check_scenario(scenario: Scenario, *, names: Sequence[str]) -> None:
+def check_scenario(scenario: Scenario) -> None:
     """Checks that a scenario's robot exists and that parameters of its FMU may have their values.
 
     Raises HexapodError.
-
-    Args:
-        names: the parameters to check.
     """
-    try:
-        interface = load_interface(load_robot(scenario.robot))
-    except HexapodError as error:
-        raise placed(error, error.where or f"{scenario.where}: robot") from error
-    for name in names:
-        if name in scenario.parameters:
-            where = f"{scenario.where}: parameters.{name}"
-            _check_parameter(interface, name, scenario.parameters[name], where)
+    interface = load_interface(load_robot(scenario.robot))
+    for name, value in scenario.parameters.items():
+        _check_parameter(interface, name, value, f"{scenario.where}: parameters.{name}")
 
 
 def _check_parameter(interface: Interface, name: str, value: Any, where: str) -> None:

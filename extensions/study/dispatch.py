@@ -37,10 +37,7 @@ CHUNKS_PER_WORKER = 2  # a worker that finishes a chunk has the next one already
 CHECK_INTERVAL = 0.5  # s    between checks for interrupts and for workers
 CONNECT_TIMEOUT = "10s"
 MAX_DEATHS_IN_A_ROW = 10  # chunks: more are not caused by single runs
-FIX_DEATHS = (
-    "look for what ends them (memory?); a script that runs a study needs "
-    '`if __name__ == "__main__":`'
-)
+FIX_DEATHS = "look for what ends them (memory?); a script needs `if __name__ == '__main__':`"
 FIX_RESUME = (
     "see that the scheduler runs and all machines have the same versions, and start the study "
     "again: it goes on, and all stored runs are kept"
@@ -120,13 +117,8 @@ def _connect(address: str) -> Any:
             raise ValueError
         return Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
-        raise StudyError(
-            "no scheduler answers",
-            got=address,
-            expected="tcp://HOST:8786 of a Dask scheduler",
-            fix="start one with `dask scheduler`, which prints its address",
-            where="--scheduler",
-        ) from error
+        what, expected = "no scheduler answers", "tcp://HOST:8786 of `dask scheduler`"
+        raise StudyError(what, got=address, expected=expected, where="--scheduler") from error
 
 
 @dataclass

@@ -32,18 +32,16 @@ from hexapod_cosim.extensions.study.records import (
 from hexapod_cosim.extensions.study.rules import (
     REQUIRED,
     Rules,
-    boolean,
+    count,
     is_number,
-    name_of,
     named_once,
+    number,
     read_table,
     require,
     seeds,
-    simple,
-    text,
     texts,
-    whole,
 )
+from hexapod_cosim.models.schema import Choice, Flag, Text, expect_table
 
 LARGEST = 1e100  # of the numbers of a factor: no sum or quotient of them overflows
 LARGEST_INTEGER = 2**53  # a double represents all integers up to it
@@ -72,8 +70,8 @@ def read_factors(table: Any, where: str) -> tuple[Factor, ...]:
 
     Names with dots may be written in quotes or as nested tables.
     """
-    require(isinstance(table, Mapping), table, "a table of factors", where, fix=f"write {EXAMPLE}")
-    return tuple(_read_factor(*item) for item in named_once(table, where, _is_section))
+    named = named_once(expect_table(table, where), where, _is_section)
+    return tuple(_read_factor(*item) for item in named)
 
 
 def _is_section(key: str, value: Any) -> bool:
@@ -106,12 +104,12 @@ def _distribution(kind: str, given: Any, where: str) -> dict[str, Any]:
 
 def _spaced(space: Callable[..., Any], given: Any, where: str) -> dict[str, Any]:
     """Returns the values of a linspace or a logspace, as keywords of Factor."""
-    low, high, count = _numbers(given, 3, where)
-    counted = count % 1 == 0 and 1 <= count <= MAX_VALUES
+    low, high, size = _numbers(given, 3, where)
+    counted = size % 1 == 0 and 1 <= size <= MAX_VALUES
     require(counted, given, f"a whole number of 1 to {MAX_VALUES} values", where)
     positive = space is np.linspace or min(low, high) > 0.0
     require(positive, given, "ends > 0", where)
-    return {"kind": VALUES, "values": tuple(space(low, high, int(count)).tolist())}
+    return {"kind": VALUES, "values": tuple(space(low, high, int(size)).tolist())}
 
 
 def _values(given: Any, where: str) -> dict[str, Any]:
@@ -124,10 +122,10 @@ def _values(given: Any, where: str) -> dict[str, Any]:
     return {"kind": VALUES, "values": tuple(given)}
 
 
-def _numbers(given: Any, count: int, where: str) -> list[float]:
-    listed = isinstance(given, list) and len(given) == count and all(map(is_number, given))
+def _numbers(given: Any, size: int, where: str) -> list[float]:
+    listed = isinstance(given, list) and len(given) == size and all(map(is_number, given))
     small = listed and all(abs(item) <= LARGEST for item in given)
-    expected = f"{count} finite numbers of at most {LARGEST:g}"
+    expected = f"{size} finite numbers of at most {LARGEST:g}"
     require(small, given, expected, where, fix=f"write {EXAMPLE}")
     return [float(item) for item in given]
 
@@ -139,7 +137,7 @@ _KINDS: Rules = {
     **{kind: (partial(_distribution, kind), None) for kind in ENDS},
 }
 KINDS = tuple(_KINDS)
-FACTOR: Rules = {**_KINDS, "unit": (text, ""), "relative": (boolean, False)}
+FACTOR: Rules = {**_KINDS, "unit": (Text().read, ""), "relative": (Flag().read, False)}
 
 
 def read_optimise(table: Any, where: str) -> tuple[Optimise, tuple[Factor, ...]]:
@@ -185,23 +183,21 @@ def _bounds(table: Any, where: str) -> tuple[Bound, ...]:
 
 
 def _bound(table: Any, where: str) -> dict[str, float]:
-    number = simple(is_number, "a number", "write { at_most = 1.0 }")
-    return read_table(
-        table, {"at_least": (number, -math.inf), "at_most": (number, math.inf)}, where
-    )
+    ends = {"at_least": (number, -math.inf), "at_most": (number, math.inf)}
+    return read_table(table, ends, where)
 
 
 EVERY_RUN = Bound(metric=WALKED, at_least=1.0)
 EVALUATION: Rules = {
-    "scenarios": (texts('scenarios = ["walk_flat"]'), REQUIRED),
-    "seeds": (seeds(10_000), range(1)),
+    "scenarios": (texts, REQUIRED),
+    "seeds": (seeds, range(1)),
 }
 OPTIMISE: Rules = {
-    "metric": (name_of(OBJECTIVES), REQUIRED),
+    "metric": (Choice(OBJECTIVES).read, REQUIRED),
     "constraints": (_bounds, (EVERY_RUN,)),
-    "trials": (whole(1, 100_000), 50),
-    "batch": (whole(1, 1000), LEAST_BATCH),
-    "control": (text, COMPARED[-1]),
+    "trials": (count, 50),
+    "batch": (count, LEAST_BATCH),
+    "control": (Text().read, COMPARED[-1]),
     "variables": (read_factors, REQUIRED),
     "training": (_evaluation, REQUIRED),
     "held_out": (_evaluation, REQUIRED),

@@ -22,7 +22,7 @@ from hexapod_cosim.controller.figure_style import SETTINGS
 from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.report.figures import Figures, figure_files, write_figures
 from hexapod_cosim.cosim.results.metric_table import FLOORS, METRICS
-from hexapod_cosim.extensions.study.records import GRID, VALUES, Factor, Study, shown_value
+from hexapod_cosim.extensions.study.records import GRID, Factor, Study, shown_value
 from hexapod_cosim.extensions.study.summary import Point, Results
 
 Array = NDArray[np.float64]
@@ -55,12 +55,11 @@ def drawing_of(results: Results) -> Drawing | None:
     varied = [factor for factor in study.factors if len(set(factor.values)) != 1]
     if not varied or not np.isfinite(means).any():
         return None
-    axes = [f for f in varied if f.kind == VALUES and len(f.values) <= MAX_CELLS]
-    if study.design == GRID and len(axes) >= 2:
-        averaged = ", averaged over the others" if len(study.factors) > 2 else ""
-        caption = f"Mean slip per metre{averaged}. Grey: no run (no pair) with a figure."
-        draw = partial(heat_map, points, axes[0], axes[1], study)
-        return Drawing("heat_map", f"{axes[0].name} and {axes[1].name}", caption, draw)
+    small = all(len(factor.values) <= MAX_CELLS for factor in varied)
+    if study.design == GRID and len(varied) == len(study.factors) == 2 and small:
+        caption = "Mean slip per metre. Grey: no run (no pair) with a figure."
+        draw = partial(heat_map, points, study)
+        return Drawing("heat_map", " and ".join(f.name for f in varied), caption, draw)
     bars = "; bars: Student's 95 % intervals over seeds" if len(study.seeds) > 1 else ""
     caption = f"Mean slip per metre of each point over each factor by itself{bars}."
     draw = partial(over_factors, points, varied[:MAX_PANELS], study)
@@ -115,18 +114,22 @@ def _draw_effect(axes: Axes, points: Sequence[Point], factor: Factor, study: Stu
         axes.set_xticks(range(len(names)), list(map(shown_value, names)), rotation=20)
 
 
-def heat_map(points: Sequence[Point], first: Factor, second: Factor, study: Study) -> Figure:
+def heat_map(points: Sequence[Point], study: Study) -> Figure:
     """Draws the slip over two factors for each control, and the changes from the first one."""
+    first, second = study.factors
     before, *others = study.controls
-    slips = {name: _slips(points, first, second, name) for name in study.controls}
+    slips = {
+        name: _cells(points, study, [p.figures.means[name][SLIP].value for p in points])
+        for name in study.controls
+    }
     seen = np.clip(np.concatenate(list(slips.values()), axis=None), FLOORS[SLIP], None)
     norm = LogNorm(float(np.nanmin(seen)), float(np.nanmax(seen)) * (1.0 + 1e-9))
     panels: list[tuple[str, Array, Normalize, str]]
     panels = [(f"{name}, slip [m/m]", values, norm, "viridis") for name, values in slips.items()]
-    for control in others:
-        change = 100.0 * (_ratios(points, first, second, control) - 1.0)
-        apart = Normalize(-100.0, 100.0)
-        panels.append((f"{before} → {control}, pairs [%]", change, apart, "RdBu_r"))
+    for name in others:
+        changes = [100.0 * point.figures.changes[name][SLIP].relative for point in points]
+        cells, apart = _cells(points, study, changes), Normalize(-100.0, 100.0)
+        panels.append((f"{before} → {name}, pairs [%]", cells, apart, "RdBu_r"))
     height = 0.42 * min(max(len(second.values), 3), 12) + 2.2
     figure = Figure(figsize=(3.6 * len(panels) + 0.8, height))
     for axes, (title, values, scale, colours) in zip(
@@ -143,35 +146,14 @@ def heat_map(points: Sequence[Point], first: Factor, second: Factor, study: Stud
     return figure
 
 
-def _slips(points: Sequence[Point], first: Factor, second: Factor, control: str) -> Array:
-    """Returns the mean slip of the points of each cell; NaN where there is none."""
-    means = [(point.figures.means[control][SLIP].value, 1.0) for point in points]
-    return _cells(points, first, second, means)
-
-
-def _ratios(points: Sequence[Point], first: Factor, second: Factor, control: str) -> Array:
-    """Returns the slip under a control over that under the reference, from the pairs of a cell."""
-    changes = [point.figures.changes[control][SLIP] for point in points]
-    return _cells(points, first, second, [(each.after, each.before) for each in changes])
-
-
-def _cells(
-    points: Sequence[Point],
-    first: Factor,
-    second: Factor,
-    fractions: Sequence[tuple[float, float]],
-) -> Array:
-    """Returns the ratio of sums over the points of each cell; NaN where there is none.
-
-    fractions: the numerator and the denominator of each point.
-    """
-    sums = np.zeros((2, len(second.values), len(first.values)))
-    for point, pair in zip(points, fractions, strict=True):
-        if all(map(math.isfinite, pair)):
-            row = second.values.index(point.values[second.name])
-            sums[:, row, first.values.index(point.values[first.name])] += pair
-    above, below = sums
-    return np.divide(above, below, out=np.full_like(above, math.nan), where=below > 0.0)
+def _cells(points: Sequence[Point], study: Study, values: Sequence[float]) -> Array:
+    """Returns the values of points by the second and the first factor; NaN where there is none."""
+    first, second = study.factors
+    cells = np.full((len(second.values), len(first.values)), math.nan)
+    for point, value in zip(points, values, strict=True):
+        row = second.values.index(point.values[second.name])
+        cells[row, first.values.index(point.values[first.name])] = value
+    return cells
 
 
 def history(results: Results) -> Figure:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -87,22 +87,17 @@ def _compare(stored: Mapping[str, Any], now: Mapping[str, Any], folder: Path) ->
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Locks a folder: within the block no other process runs a study into it.
+    """Locks a folder: within the block no other process runs a study into it. Raises StudyError.
 
-    Raises StudyError when another process has the lock. On a file system without locks the folder
-    is not locked.
+    On a file system without locks the folder is not locked.
     """
     lock = FileLock(folder / LOCK, blocking=False, fallback_to_soft=False)
-    try:
-        lock.acquire()
-    except Timeout as error:
-        raise StudyError(
-            "another process runs a study into this folder",
-            fix="wait for it, or choose another with -o",
-            where=str(folder),
-        ) from error
-    except OSError:
-        pass  # a file system without locks
+    with suppress(NotImplementedError):  # a file system without locks
+        try:
+            lock.acquire()
+        except Timeout as error:
+            what, fix = "another process runs a study into this folder", "wait for it, or use -o"
+            raise StudyError(what, fix=fix, where=str(folder)) from error
     try:
         yield
     finally:

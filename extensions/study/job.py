@@ -25,8 +25,6 @@ from hexapod_cosim.cosim.run.plan import chosen_gains, design_key
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.scenario.controls import table_with_control
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table
-from hexapod_cosim.cosim.scenario.tables import with_values
-from hexapod_cosim.extensions.study.factors import samples
 from hexapod_cosim.extensions.study.records import Study
 from hexapod_cosim.extensions.study.rules import require
 from hexapod_cosim.models import list_robots
@@ -66,7 +64,8 @@ def make_job(
     what, fix = "one FMU for several robots", "leave --fmu out: each robot's is exported"
     single = fmu is None or len(names) == 1
     require(single, ", ".join(names), "a single robot", "--fmu", what=what, fix=fix)
-    _check_controls(study)
+    for case in study.cases.values():  # a control takes the parameters of [control], or is refused
+        check_control(scenario_from_table(case.table, where=case.where), study.laws)
     robots = [name for name in names if name not in list_robots()]
     laws = [control.path for control in study.laws]
     factors = tuple(replace(factor, values=()) for factor in study.factors)
@@ -80,18 +79,6 @@ def make_job(
         environment=environment(files),
         runner=runner,
     )
-
-
-def _check_controls(study: Study) -> None:
-    """Raises HexapodError for a user's control that does not take the parameters of [control]."""
-    varied = {
-        factor.name: factor.setting(samples(factor)[0])
-        for factor in study.factors
-        if factor.name.startswith("control.")
-    }
-    for case in study.cases.values():
-        table = with_values(case.table, varied)
-        check_control(scenario_from_table(table, where=case.where), study.laws)
 
 
 def _robots(study: Study) -> list[str]:

@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.study.factors import at_quantile
 from hexapod_cosim.extensions.study.records import (
     DRAWN,
     GRID,
     LATIN_HYPERCUBE,
+    RANDOM,
     SCENARIO_FACTOR,
     SOBOL,
     Order,
@@ -27,42 +29,39 @@ from hexapod_cosim.extensions.study.records import (
 )
 
 STREAM = 2  # of random numbers of the study's seed; scenarios use the streams 0 and 1
-Shares = Callable[[int], np.ndarray[tuple[int], np.dtype[np.float64]]]
+Array = NDArray[np.float64]
 
 
-class Design:
-    """The points of a study."""
+def points_of(study: Study) -> Callable[[int], tuple[Value, ...]]:
+    """Returns a function from a point's number to the values of the factors at it.
 
-    def __init__(self, study: Study) -> None:
-        self._study = study
-        self._shape = [len(factor.values) for factor in study.factors]
-        self._shares = _shares(study)
+    In a grid the last factor changes fastest.
+    """
+    factors, shape = study.factors, [len(factor.values) for factor in study.factors]
+    if study.design in DRAWN:
+        shares = _shares(study)
+        return lambda index: tuple(map(at_quantile, factors, shares(index).tolist()))
 
-    def point(self, index: int) -> tuple[Value, ...]:
-        """Returns the values of the factors at a point; in a grid the last one changes fastest."""
-        factors = self._study.factors
-        if self._study.design in DRAWN:
-            return tuple(map(at_quantile, factors, self._shares(index).tolist()))
-        places: Sequence[Any] = (index,) * len(factors)
-        if self._study.design == GRID and factors:
-            places = np.unravel_index(index, self._shape)
+    def point(index: int) -> tuple[Value, ...]:
+        grid = study.design == GRID and len(factors) > 0
+        places: Any = np.unravel_index(index, shape) if grid else (index,) * len(factors)
         return tuple(factor.values[place] for factor, place in zip(factors, places, strict=True))
 
+    return point
 
-def _shares(study: Study) -> Shares:
+
+def _shares(study: Study) -> Callable[[int], Array]:
     """Returns a function from a point's number to the quantiles (factors,) of its values."""
     from scipy.stats import qmc  # noqa: PLC0415  slow to import, and workers draw no points
 
     size, seed = len(study.factors), np.random.default_rng([study.seed, STREAM])
-    if study.design == LATIN_HYPERCUBE:
-        cube = qmc.LatinHypercube(size, seed=seed).random(study.points)
-        return lambda index: cube[index]
-    if study.design == SOBOL:
-        with warnings.catch_warnings():  # of points that are no power of two
-            warnings.simplefilter("ignore", UserWarning)
-            sequence = qmc.Sobol(size, scramble=True, seed=seed).random(study.points)
-        return lambda index: sequence[index]
-    return lambda index: np.random.default_rng([study.seed, STREAM, index]).random(size)
+    if study.design == RANDOM:
+        return lambda index: np.random.default_rng([study.seed, STREAM, index]).random(size)
+    sampler = {LATIN_HYPERCUBE: qmc.LatinHypercube, SOBOL: qmc.Sobol}[study.design]
+    with warnings.catch_warnings():  # of Sobol points that are no power of two
+        warnings.simplefilter("ignore", UserWarning)
+        drawn: Array = sampler(size, seed=seed).random(study.points)
+    return lambda index: drawn[index]
 
 
 def sweep_orders(study: Study, runs: Iterable[int]) -> Iterator[Order]:
@@ -70,14 +69,14 @@ def sweep_orders(study: Study, runs: Iterable[int]) -> Iterator[Order]:
 
     Runs are numbered by point, then seed, then control.
     """
-    design, known, case = Design(study), -1, ""
+    point_at, known, case = points_of(study), -1, ""
     values: tuple[Value, ...] = ()
     names, first = [factor.name for factor in study.factors], next(iter(study.cases))
     for run in runs:
         pair, control = divmod(run, len(study.controls))
         point, seed = divmod(pair, len(study.seeds))
         if point != known:
-            known, values = point, design.point(point)
+            known, values = point, point_at(point)
             case = str(dict(zip(names, values, strict=True)).get(SCENARIO_FACTOR, first))
         yield Order(
             run=run,
@@ -108,16 +107,15 @@ def trial_orders(
     ]
 
 
+def count_points(study: Study) -> int:
+    """Returns the number of points of a study without an optimiser."""
+    lengths = [len(factor.values) for factor in study.factors]
+    grid = math.prod(lengths if study.design == GRID else lengths[:1])
+    return study.points if study.design in DRAWN else grid
+
+
 def count_runs(study: Study) -> int:
     """Returns the number of runs of a study."""
     if study.optimise is not None:
         return study.optimise.count
     return count_points(study) * len(study.seeds) * len(study.controls)
-
-
-def count_points(study: Study) -> int:
-    """Returns the number of points of a study without an optimiser."""
-    lengths = [len(factor.values) for factor in study.factors]
-    if study.design in DRAWN:
-        return study.points
-    return math.prod(lengths if study.design == GRID else lengths[:1])

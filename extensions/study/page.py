@@ -22,6 +22,7 @@ from hexapod_cosim.extensions.study.summary import POINT_METRICS, SUMMARY, Mean,
 
 SHOWN_POINTS = 100  # rows of the table of points
 PARTS = {"training": "training", "held_out": "held out"}
+ENDINGS = {COMPLETED: "fell"}  # how a run ended that did not walk to its end
 
 
 @dataclass(frozen=True)
@@ -62,15 +63,10 @@ def overall_table(results: Results) -> Table:
 def failure_table(results: Results) -> Table:
     """Returns a row for each reason for which runs did not walk to their end."""
     rows = [
-        [str(count), control, ending(status), reason]
+        [str(count), control, ENDINGS.get(status, status), reason]
         for (control, status, reason), count in results.failures.items()
     ]
     return Table(["runs", "control", "how", "reason"], rows, left=("control", "how", "reason"))
-
-
-def ending(status: str) -> str:
-    """Returns the word for how a run ended that did not walk to its end."""
-    return "fell" if status == COMPLETED else status
 
 
 def point_table(results: Results) -> Table:
@@ -96,44 +92,39 @@ def _point_row(point: Point, results: Results) -> list[str]:
     return row
 
 
-def optimum_tables(results: Results) -> list[Table]:
-    """Returns the settings before the optimisation and of the best trial, and the changes."""
-    if results.optimum is None:
-        return []
-    before, best = results.optimum["before"], results.optimum["best"]
-    columns = [f"{name}, {words}" for part, words in PARTS.items() for name in before[part]]
+def optimum_table(results: Results) -> Table:
+    """Returns a row for each metric before and after an optimisation, with its change."""
+    optimum = results.optimum or {"before": {}, "best": {}}
+    before, best = optimum["before"], optimum["best"]
     rows = [
         [
-            label,
-            *(
-                shown_value(best["values"][name] if item is best else None)
-                for name in best["values"]
-            ),
-            *(_shown_figure(*figure) for part in PARTS for figure in item[part].items()),
+            *(words, name, _shown_figure(name, value), _shown_figure(name, best[part][name])),
+            *_shown_table(best["change"][part].get(name)),
         ]
-        for label, item in (("before", before), (_trial(best), best))
-    ]
-    changes = [
-        [words, name, *_shown_table(table), str(table["pairs"])]
         for part, words in PARTS.items()
-        for name, table in best["change"][part].items()
+        for name, value in before.get(part, {}).items()
     ]
-    titles = ["runs", "metric", "change", "95 % interval", "", "pairs"]
-    return [
-        Table(["", *best["values"], *columns], rows, left=("",)),
-        Table(titles, changes, left=("runs", "metric", "")),
-    ]
+    columns = ["runs", "metric", "before", "after", "change", "95 % interval", "", "pairs"]
+    return Table(columns, rows, left=("runs", "metric", ""))
 
 
-def _trial(trial: Mapping[str, Any]) -> str:
-    return f"trial {trial['number']}" + ("" if trial["feasible"] else " (breaks a constraint)")
+def best_settings(results: Results) -> str:
+    """Returns the settings of the best trial as text, "" without one."""
+    if results.optimum is None:
+        return ""
+    best = results.optimum["best"]
+    values = [f"{name} {shown_value(value)}" for name, value in best["values"].items()]
+    broken = "" if best["feasible"] else "; it breaks a constraint"
+    return f"Best: trial {best['number']}, {', '.join(values)}{broken}"
 
 
-def _shown_table(table: Mapping[str, Any]) -> list[str]:
-    """Returns change, interval and verdict of a table of Change.as_table() that JSON held."""
+def _shown_table(table: Mapping[str, Any] | None) -> list[str]:
+    """Returns change, interval, verdict and pairs of a table of Change.as_table() from JSON."""
+    if table is None or table["relative"] is None:
+        return ["-", "", "", ""]
     relative, low, high = (table[key] for key in ("relative", "low", "high"))
     interval = "" if low is None else f"{100.0 * low:+.1f} to {100.0 * high:+.1f} %"
-    return ["-" if relative is None else f"{100.0 * relative:+.1f} %", interval, table["verdict"]]
+    return [f"{100.0 * relative:+.1f} %", interval, table["verdict"], str(table["pairs"])]
 
 
 def shown_mean(name: str, item: Mean) -> str:
@@ -170,7 +161,8 @@ def write_study_report(results: Results, folder: Path) -> list[Path]:
         points=point_table(results),
         drawing=drawing,
         picture=embedded(folder / FIGURES_FOLDER / f"{drawing.name}.svg") if drawing else "",
-        optimum=optimum_tables(results),
+        optimum=optimum_table(results),
+        best=best_settings(results),
         failures=failure_table(results),
         notes=list(notes(results)),
         method=METHOD,
@@ -212,7 +204,7 @@ def notes(results: Results) -> Iterator[str]:
             alike = "all" if count == total else f"{count} of them"
             yield (
                 f"none of {total} {control} runs walked to its end; "
-                f"{alike} {ending(status)}: {reason}"
+                f"{alike} {ENDINGS.get(status, status)}: {reason}"
             )
         elif walked and not results.figured[control]:
             yield f"All {walked} {control} walks are {TOO_SHORT}"

@@ -13,13 +13,8 @@ from hexapod_cosim.models import HexapodError
 
 Value = float | int | bool | str
 
-VALUES, UNIFORM, LOGUNIFORM, NORMAL, INTEGERS = (
-    "values",
-    "uniform",
-    "loguniform",
-    "normal",
-    "integers",
-)
+KINDS = ("values", "uniform", "loguniform", "normal", "integers")
+VALUES, UNIFORM, LOGUNIFORM, NORMAL, INTEGERS = KINDS
 DESIGNS = ("grid", "list", "random", "latin_hypercube", "sobol")
 GRID, LIST, RANDOM, LATIN_HYPERCUBE, SOBOL = DESIGNS
 DRAWN = (RANDOM, LATIN_HYPERCUBE, SOBOL)  # designs with a given number of points
@@ -50,8 +45,12 @@ class Factor:
     @property
     def label(self) -> str:
         """The name with the unit."""
-        unit = "x designed" if self.relative else self.unit
-        return f"{self.name} [{unit}]" if unit else self.name
+        return f"{self.name} [{self.shown_unit}]" if self.shown_unit else self.name
+
+    @property
+    def shown_unit(self) -> str:
+        """The unit of the values."""
+        return "designed gain" if self.relative else self.unit
 
     def setting(self, value: Value) -> Value:
         """Returns the value as a scenario accepts it, with its unit."""

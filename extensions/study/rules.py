@@ -1,7 +1,7 @@
-"""Rules for the values of a study file: each reads a value or raises StudyError.
+"""Rules for the values of a study file: each reads a value or raises HexapodError.
 
-A table of a file is read by a table of rules, from keys to a rule and a default. A rule is called
-with None for a missing key that is REQUIRED, and refuses it as missing.
+A table of a file is read by a table of rules, from keys to a rule and a default, or REQUIRED. A
+rule is a function, such as the `read` of models/schema.py's types.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Any
 
 from hexapod_cosim.extensions.study.records import StudyError
 from hexapod_cosim.models import unknown_name
+from hexapod_cosim.models.schema import Texts, Whole, expect_table
 
 Rule = Callable[[Any, str], Any]  # from a value and its place to what it means
 Rules = Mapping[str, tuple[Rule, Any]]
@@ -48,23 +49,14 @@ def read_table(value: Any, rules: Rules, where: str) -> dict[str, Any]:
 
     `where`: the file, or the file and the key of the table.
     """
-    table(value, where)
-    require_known(value, rules, where, "key")
-    before = f"{where}." if ": " in where else f"{where}: "
-    return {
-        key: rule(value.get(key), before + key) if key in value or default is REQUIRED else default
-        for key, (rule, default) in rules.items()
-    }
-
-
-def simple(holds: Callable[[Any], bool], expected: str, fix: str = "correct it") -> Rule:
-    """Returns the rule of a value that is taken as it is when a condition holds."""
-
-    def read(value: Any, where: str) -> Any:
-        require(holds(value), value, expected, where, fix=fix)
-        return value
-
-    return read
+    require_known(expect_table(value, where), rules, where, "key")
+    before, found = f"{where}." if ": " in where else f"{where}: ", {}
+    for key, (rule, default) in rules.items():
+        place, what = before + key, "missing key"
+        given = key in value or default is not REQUIRED
+        require(given, None, "a value", place, what=what, fix=f"add `{key} = ...`")
+        found[key] = rule(value[key], place) if key in value else default
+    return found
 
 
 def is_number(value: Any) -> bool:
@@ -72,58 +64,36 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-text = simple(lambda value: isinstance(value, str), "a text in quotes")
-boolean = simple(lambda value: isinstance(value, bool), "true or false", "leave the quotes out")
-table = simple(lambda value: isinstance(value, Mapping), "a table", "write it as [section]")
+def number(value: Any, where: str) -> float:
+    """Returns a finite number."""
+    require(is_number(value), value, "a finite number", where)
+    return float(value)
 
 
-def texts(example: str) -> Rule:
-    """Returns the rule of a list of one or more different texts."""
-    return simple(
-        lambda value: (
-            isinstance(value, list)
-            and all(isinstance(item, str) for item in value)
-            and 0 < len(value) == len(set(value))
-        ),
-        "a list of different texts",
-        f"write {example}",
-    )
+def texts(value: Any, where: str) -> tuple[str, ...]:
+    """Returns the texts of a list: one or more, all different."""
+    found = Texts().read(value, where)
+    require(0 < len(found) == len(set(found)), value, "a list of different texts", where)
+    return found
 
 
-def whole(least: int, most: int) -> Rule:
-    """Returns the rule of a whole number within bounds."""
-    return simple(
-        lambda value: type(value) is int and least <= value <= most,
-        f"a whole number >= {least} and <= {most}",
-    )
+def count(value: Any, where: str) -> int:
+    """Returns a whole number from 1."""
+    require(Whole().read(value, where) >= 1, value, "a whole number >= 1", where)
+    return int(value)
 
 
-def name_of(known: Sequence[str]) -> Rule:
-    """Returns the rule of one of the names `known`."""
-
-    def read(value: Any, where: str) -> str:
-        require(isinstance(value, str), value, f"one of {', '.join(known)}", where)
-        require_known([value], known, where, "name")
-        return str(value)
-
-    return read
-
-
-def seeds(most: int) -> Rule:
-    """Returns the rule of seeds: their number, { first, count } or a list of them."""
-
-    def read(value: Any, where: str) -> Sequence[int]:
-        if isinstance(value, list):
-            different = 0 < len(value) == len(set(map(str, value)))
-            require(different, value, "different whole numbers", where, fix="write seeds = 10")
-            return tuple(whole(0, LARGEST)(item, where) for item in value)
-        if not isinstance(value, Mapping):
-            return range(whole(1, most)(value, where))
-        rules = {"count": (whole(1, most), 1), "first": (whole(0, LARGEST - most), 0)}
-        given = read_table(value, rules, where)
-        return range(given["first"], given["first"] + given["count"])
-
-    return read
+def seeds(value: Any, where: str) -> Sequence[int]:
+    """Returns seeds from their number, { first, count } or a list of them."""
+    if isinstance(value, list):
+        different = 0 < len(value) == len(set(map(str, value)))
+        require(different, value, "different whole numbers", where, fix="write seeds = 10")
+        return tuple(Whole().read(item, where) for item in value)
+    table = value if isinstance(value, Mapping) else {"count": value}
+    given = read_table(table, {"count": (count, 1), "first": (Whole().read, 0)}, where)
+    found = range(given["first"], given["first"] + given["count"])
+    require(found[-1] <= LARGEST, value, "whole numbers within 64 bits", where)
+    return found
 
 
 def _is_table(_key: str, value: Any) -> bool:

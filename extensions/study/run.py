@@ -6,9 +6,10 @@ The command is in study_command.py, because the imports of this module take a se
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -46,9 +47,10 @@ from hexapod_cosim.extensions.study.job import make_job, manifest_of
 from hexapod_cosim.extensions.study.orders import count_runs, sweep_orders
 from hexapod_cosim.extensions.study.page import (
     Table,
+    best_settings,
     failure_table,
     notes,
-    optimum_tables,
+    optimum_table,
     overall_table,
     write_study_report,
 )
@@ -59,8 +61,8 @@ from hexapod_cosim.extensions.study.store import Store
 from hexapod_cosim.extensions.study.summary import Results, read_results, summary_of
 
 MAX_REASONS = 10  # of failures that are shown
-# gets the numbers of all runs and of those that are done, and returns the display of progress
-StartProgress = Callable[[int, int], ProgressSink]
+# opens the display of progress for a number of runs
+Progress = Callable[[int], AbstractContextManager[ProgressSink]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,14 +78,11 @@ class Options:
     runner: type[Runner] = Runner  # a class that workers can import
 
 
-def run_study(study: Study, folder: Path, *, options: Options, start: StartProgress) -> Path:
+def run_study(study: Study, folder: Path, *, options: Options, progress: Progress) -> Path:
     """Runs the runs of a study that the folder does not hold and writes all results.
 
     Raises HexapodError for a folder of something else, a full disk or a cluster that is gone. All
     runs stored so far are kept.
-
-    Args:
-        start: function that is called when the number of runs is known.
 
     Returns:
         The file of results.
@@ -91,10 +90,13 @@ def run_study(study: Study, folder: Path, *, options: Options, start: StartProgr
     count = count_runs(study)
     job = make_job(study, fmu=options.fmu, gains=options.gains, runner=options.runner)
     begin_folder(folder, manifest_of(study, job, runs=count), command=options.command)
-    with locked(folder), closing(Store(folder, study)) as store:
+    with locked(folder), closing(Store(folder, study)) as store, progress(count) as show:
         missing = np.flatnonzero(~store.done(count))
         done = count - len(missing)
-        sink = ResultSink(job, store, start(count, done), done)
+        if done:
+            print(f"resumed: {done} of {count} runs are there already", file=sys.stderr)
+        show(done, 0)
+        sink = ResultSink(job, store, show, done)
         with open_workers(options, count) as workers:
             if study.optimise is not None:
                 optimise(study, sink, workers, folder)
@@ -126,8 +128,8 @@ def run_and_report(
     """
     plan = load_study(file, controls=controls)
     try:
-        with progress(plain=not json) as start:
-            results = run_study(plan, folder, options=options, start=start)
+        progress = partial(counting_bar, "runs", plain=not json)
+        results = run_study(plan, folder, options=options, progress=progress)
     except KeyboardInterrupt:
         warn(f"stopped; the runs so far are in {folder}, and the same command resumes the study")
         raise
@@ -154,25 +156,6 @@ def report_on(folder: Path) -> tuple[Results, list[Path]]:
     return found, files
 
 
-@contextmanager
-def progress(*, plain: bool) -> Iterator[StartProgress]:
-    """Yields a function that starts the display of progress when the number of runs is known.
-
-    The display is a bar with rate, remaining time and failures on a terminal, and lines elsewhere
-    if `plain`.
-    """
-    with ExitStack() as shown:
-
-        def start(total: int, done: int) -> ProgressSink:
-            if done:
-                print(f"resumed: {done} of {total} runs are there already", file=sys.stderr)
-            show = shown.enter_context(counting_bar("runs", total, plain=plain))
-            show(done, 0)
-            return show
-
-        yield start
-
-
 def show_study(found: Results) -> None:
     """Prints the table of all runs, totals, failures by reason and the optimum."""
     overall, controls = found.overall, found.study.controls
@@ -185,8 +168,9 @@ def show_study(found: Results) -> None:
         show_text(f"{METHOD}.")
     for count, control, how, reason in failure_table(found).rows[:MAX_REASONS]:
         show_text(f"{count:>6} x {control} {how}: {reason}")
-    for table in optimum_tables(found):
-        _show(table)
+    if found.optimum is not None:
+        show_text(best_settings(found))
+        _show(optimum_table(found))
 
 
 def _show(table: Table) -> None:

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.extensions.study.records import (
-    GAINS,
     SCENARIO_FACTOR,
     VALUES,
     Factor,
@@ -57,7 +56,7 @@ def columns_of(study: Study) -> list[Column]:
         Column("run", f"{INTEGER} PRIMARY KEY"),
         Column("point", INTEGER),
         Column("case", TEXT),
-        *(Column(factor.name, _kind_of(factor), _unit_of(factor)) for factor in factors),
+        *(Column(factor.name, _kind_of(factor), factor.shown_unit) for factor in factors),
         Column("seed", INTEGER),
         *(Column(name, TEXT) for name in ("control", "status", "reason")),
         *(Column(name, BOOLEAN) for name in ("upright", "walked")),
@@ -66,10 +65,6 @@ def columns_of(study: Study) -> list[Column]:
         *(Column(name, REAL, METRICS[name][0]) for name in FIGURES),
         Column(WALL, REAL, "s"),
     ]
-
-
-def _unit_of(factor: Factor) -> str:
-    return "designed gain" if factor.name.startswith(GAINS) and factor.relative else factor.unit
 
 
 def _kind_of(factor: Factor) -> str:

@@ -17,34 +17,6 @@ EPILOG = (
     f"A fall is a result of a study. Exit code {FELL} only when no run walked to its end "
     "and the robot fell in some of them."
 )
-MAX_WORKERS = 4096
-Workers = Annotated[
-    int | None,
-    typer.Option(
-        "--workers",
-        min=0,
-        max=MAX_WORKERS,
-        metavar="N",
-        help="Processes on this machine; default: one for each processor; 0: no other process.",
-    ),
-]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="Run on the workers of this Dask scheduler: tcp://HOST:8786.",
-    ),
-]
-StudyFolder = Annotated[
-    Path | None,
-    typer.Option(
-        "-o",
-        "--output",
-        metavar="DIR",
-        help="Folder to write, or to resume; default out/STUDY.",
-    ),
-]
 
 
 def study(
@@ -53,9 +25,25 @@ def study(
         typer.Argument(metavar="STUDY", help="A study file, or a name of `hexapod list studies`."),
     ],
     control: ControlNames = None,
-    output: StudyFolder = None,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="DIR", help="Folder to write or resume; default out/STUDY."
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=4096,
+            metavar="N",
+            help="Processes; default: one for each processor; 0: none.",
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Run on this Dask scheduler: tcp://HOST:8786."),
+    ] = None,
     fmu: FmuFile = None,
     gains: GainsFile = None,
     json: Json = False,

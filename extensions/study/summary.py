@@ -179,21 +179,14 @@ class Results:
         return sum(self.overall.runs.values())
 
 
-def stored_study(folder: Path) -> tuple[Study, dict[str, Any]]:
-    """Reads the study of a folder and its manifest. Raises HexapodError when there is none."""
-    manifest: dict[str, Any] = read_json(folder / MANIFEST)
-    where = str(folder / MANIFEST)
-    study = study_from_table(manifest["study"], where=where, scenarios=manifest["scenarios"])
-    # a study without a title has the name of its file
-    return replace(study, title=manifest["title"]), manifest
-
-
 def read_results(folder: Path) -> Results:
     """Reads the results of a study, also of one that runs, and writes summary.json.
 
     Raises HexapodError when the folder holds no study or its file of runs is damaged.
     """
-    study, manifest = stored_study(folder)
+    manifest, where = read_json(folder / MANIFEST), str(folder / MANIFEST)
+    study = study_from_table(manifest["study"], where=where, scenarios=manifest["scenarios"])
+    study = replace(study, title=manifest["title"])  # by default the name of the file
     with closing(Store(folder, study)) as store:
         runs = Runs(study, store)
         of_walks = [FIGURES.index(name) for name in FIGURES if name not in OF_THE_RUN]

@@ -7,7 +7,7 @@ import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from threading import Lock
+from threading import RLock
 from time import perf_counter
 
 from hexapod_cosim.controller import Gains
@@ -37,7 +37,7 @@ ADDRESS = re.compile(r"0x[0-9a-fA-F]+")  # of an object in memory, which differs
 # the runner of this process by the name of its job; a worker of a cluster may get another job
 _runners: dict[str, Runner] = {}
 # a cluster's worker may have threads, and the loader of an FMU changes the working directory
-_one_at_a_time = Lock()
+_one_at_a_time = RLock()
 
 
 def run_orders(job: Job, orders: Sequence[Order]) -> list[RunResult]:
@@ -50,19 +50,15 @@ def run_orders(job: Job, orders: Sequence[Order]) -> list[RunResult]:
         raise_if_stopped(0.0)
         if job.name not in _runners:
             _check_environment(job)
-            _close_runners()
+            close_runners()
         return [_run(job, order) for order in orders]
 
 
 def close_runners() -> None:
     """Closes the FMUs that this process has opened."""
     with _one_at_a_time:
-        _close_runners()
-
-
-def _close_runners() -> None:
-    while _runners:
-        _runners.popitem()[1].close()
+        while _runners:
+            _runners.popitem()[1].close()
 
 
 def _check_environment(job: Job) -> None:
@@ -98,7 +94,7 @@ def _summary(job: Job, order: Order) -> Summary:
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # an error in a control ends this run, not the study
-        _close_runners()  # their state is unknown
+        close_runners()  # their state is unknown
         return summary_without_figures(order, describe_exception(error), status=FAILED)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from hexapod_cosim.models.errors import RobotError
-from hexapod_cosim.models.friction import STATIC_LAWS, Friction
+from hexapod_cosim.models.friction import LAWS, Friction
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.valleys import tightest_valley
 from hexapod_cosim.models.records import BodyContact, Robot, Servo
@@ -118,8 +118,8 @@ def check_static_friction(friction: Friction, where: str) -> None:
         what = "static friction below kinetic"
         fix = "raise it or leave it out"
         raise RobotError(what, got=static, expected=f"at least mu = {mu:g}", fix=fix, where=where)
-    if friction.law not in STATIC_LAWS:
-        laws = " or ".join(STATIC_LAWS)
+    if not friction.has_friction:
+        laws = " or ".join(name for name, law in LAWS.items() if law.has_friction)
         what = "static friction that has no effect"
         got = f"{static:g} with the law {friction.law}"
         expected = f"friction.law = {laws}" if laws else f"mu = {mu:g}: no law uses another"

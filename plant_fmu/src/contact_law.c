@@ -207,7 +207,8 @@ void hx_contact_release(hxContactState *contact) {
     contact->cell[0][slot] = contact->cell[1][slot] = -1.0;
 }
 
-hxSoil hx_contact_soil(const hxContactState *contact, int row, int slot) {
+/* Returns the soil on which a contact touched down. */
+static hxSoil soil_of(const hxContactState *contact, int row, int slot) {
   hxSoil soil;
   double numbers[HX_SOIL_SIZE];
   for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = contact->soil[hx_soil_row(row)][i][slot];
@@ -220,7 +221,7 @@ hxSoil hx_contact_soil(const hxContactState *contact, int row, int slot) {
 static void start_in_soil(const hxDepths *depths, int row, hxContactState *contact) {
   const int soft = hx_soil_row(row);
   for (int slot = 0; slot < hx_slots_of(row); ++slot) {
-    const hxSoil soil = hx_contact_soil(contact, row, slot);
+    const hxSoil soil = soil_of(contact, row, slot);
     if (contact->closed[row][slot] != 0.0 && contact->on_soil[soft][slot] != 0.0)
       contact->plastic[soft][slot] = hx_soil_plastic_depth(&soil, depths->delta[row][slot]);
   }

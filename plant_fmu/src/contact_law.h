@@ -27,9 +27,6 @@ void hx_contact_release(hxContactState *contact);
  */
 void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactState *contact);
 
-/* Returns the soil on which a contact touched down. */
-hxSoil hx_contact_soil(const hxContactState *contact, int row, int slot);
-
 /* Returns whether feet stand on cells of blocks. */
 int hx_has_cells(const hxModel *model);
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from mirror import HxSoilDefinition, Real
 from plant import pointer
+from scipy.integrate import quad
 
 from hexapod_cosim.models import SOIL_LAWS, load_robot
 from hexapod_cosim.models.records import Foot, Soil
@@ -163,7 +164,8 @@ def test_a_measured_soil_has_its_figures(
     z_p = law.plastic_depth(soil, PAD, DEPTH)
     limit = law.shear_limit(soil, PAD, DEPTH, LOAD)
     assert law.virgin_force(soil, PAD, DEPTH) == pytest.approx(force, rel=CHECK)
-    assert law.virgin_work(soil, PAD, DEPTH) == pytest.approx(work, rel=CHECK)
+    taken = quad(lambda z: law.virgin_force(soil, PAD, z), 0.0, DEPTH)[0]
+    assert taken == pytest.approx(work, rel=CHECK)
     assert law.virgin_force(soil, BALL, DEPTH) == pytest.approx(ball, rel=CHECK)
     assert z_p == pytest.approx(plastic, rel=CHECK)
     assert law.stored_energy(soil, PAD, z_p, DEPTH) == pytest.approx(back, rel=CHECK)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import closing
+from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -31,15 +31,20 @@ def study_of(table: Mapping[str, Any] = SMALL, **changes: Any) -> Study:
     return study_from_table({**table, **changes}, where="test.toml")
 
 
-def quiet(_total: int, _done: int) -> Any:
-    """Starts no display of progress."""
-    return lambda _more, _lost: None
+def quiet(_total: int) -> Any:
+    """Opens no display of progress."""
+    return nullcontext(lambda _done, _failed: None)
+
+
+def watched(act: Callable[[], object]) -> Any:
+    """Returns a display of progress that calls `act` for each number of new results."""
+    return lambda _total: nullcontext(lambda done, _failed: done and act())
 
 
 def run_quietly(study: Study, folder: Path, **options: Any) -> list[Row]:
     """Runs a study without a display of progress; returns the rows of its results."""
     run_study(
-        study, folder, options=Options(**{"runner": Fake, "workers": 0, **options}), start=quiet
+        study, folder, options=Options(**{"runner": Fake, "workers": 0, **options}), progress=quiet
     )
     return rows(folder)
 

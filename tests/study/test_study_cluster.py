@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from command import COMMAND
 from dask_cluster import TIMEOUT, dask_scheduler, kill, mortal_workers, restarting_workers
-from studies import KINEMATIC, Row, quiet, rows, run_quietly, study_of
+from studies import KINEMATIC, Row, quiet, rows, run_quietly, study_of, watched
 from study_runners import Slow
 
 from hexapod_cosim.extensions.study.records import StudyError
@@ -37,15 +37,17 @@ def study_on(athena_fmu: Path, tmp_path: Path, scheduler: str) -> Callable[..., 
 
     def run(after_the_first: Callable[[], object], address: str = scheduler) -> None:
         options = Options(runner=Slow, fmu=athena_fmu, scheduler=address)
-        run_study(study_of(TABLE), tmp_path / "out", options=options, start=once(after_the_first))
+        run_study(
+            study_of(TABLE), tmp_path / "out", options=options, progress=once(after_the_first)
+        )
 
     return run
 
 
 def once(act: Callable[[], object]) -> Any:
-    """Returns a start function whose progress display calls `act` once."""
+    """Returns a display of progress that calls `act` once, when the first results are there."""
     todo = [act]
-    return lambda _total, _done: lambda _more, _lost: todo and todo.pop()()
+    return watched(lambda: todo and todo.pop()())
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +104,7 @@ def test_studies_that_share_a_cluster_do_not_disturb_each_other(
 
     def run(k: int) -> None:
         options = Options(runner=Slow, fmu=athena_fmu, scheduler=scheduler)
-        run_study(study_of(tables[k]), tmp_path / f"out{k}", options=options, start=quiet)
+        run_study(study_of(tables[k]), tmp_path / f"out{k}", options=options, progress=quiet)
 
     with mortal_workers(scheduler, 2, tmp_path), ThreadPoolExecutor(len(tables)) as together:
         list(together.map(run, range(len(tables))))

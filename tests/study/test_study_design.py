@@ -12,7 +12,7 @@ from scipy import stats
 from studies import study_of
 
 from hexapod_cosim.extensions.study.factors import at_quantile
-from hexapod_cosim.extensions.study.orders import Design, count_points, count_runs, sweep_orders
+from hexapod_cosim.extensions.study.orders import count_points, count_runs, points_of, sweep_orders
 from hexapod_cosim.extensions.study.records import (
     INTEGERS,
     LOGUNIFORM,
@@ -38,8 +38,7 @@ def table(study: Study) -> np.ndarray[Any, Any]:
 
 
 def points(study: Study) -> list[tuple[Any, ...]]:
-    design = Design(study)
-    return [design.point(index) for index in range(count_points(study))]
+    return list(map(points_of(study), range(count_points(study))))
 
 
 def test_a_grid_is_the_product_of_its_factors_the_last_fastest() -> None:
@@ -82,9 +81,9 @@ def test_sobol_points_fill_squares_too_and_random_ones_do_not() -> None:
 @pytest.mark.parametrize("design", ["random", "latin_hypercube", "sobol"])
 def test_points_depend_on_the_seed_only_and_not_on_the_order_of_calls(design: str) -> None:
     whole = table(drawn(design))
-    again = Design(drawn(design))
+    again = points_of(drawn(design))
     for index in (40, 3, 3, 63, 0, 41):
-        assert tuple(whole[index]) == again.point(index)
+        assert tuple(whole[index]) == again(index)
     assert not np.array_equal(whole, table(drawn(design, seed=1)))
 
 

@@ -84,22 +84,10 @@ def test_a_cell_shows_its_slips_and_is_empty_without_a_walk() -> None:
         point(0, {"friction.mu": 0.3, "command.vx": 0.05}, {"kinematic": 0.4, "compliant": 0.1}),
         point(1, {"friction.mu": 0.3, "command.vx": 0.08}, nothing, walked=0, pairs=0),  # fell
     ]
-    figure = figures.heat_map(points, study.factors[0], study.factors[1], study)
+    figure = figures.heat_map(points, study)
     nan = math.nan
     for place, expected in enumerate((0.4, 0.1, -75.0)):
         np.testing.assert_allclose(shown(figure, place), [[expected, nan], [nan, nan]])
-
-
-def test_the_change_of_a_cell_is_that_of_its_pairs() -> None:
-    """One of the two points in a cell has no pair, so its means do not count."""
-    study = study_of({"factors": {**GRID["factors"], "gait.name": ["tripod", "wave"]}})
-    place = {"friction.mu": 0.3, "command.vx": 0.05}
-    points = [
-        point(0, place, {"kinematic": 0.4, "compliant": 0.2}),
-        point(1, place, {"kinematic": 9.0, "compliant": 0.2}, pairs=0),
-    ]
-    figure = figures.heat_map(points, study.factors[0], study.factors[1], study)
-    assert shown(figure)[0, 0] == pytest.approx(-50.0)
 
 
 @pytest.fixture

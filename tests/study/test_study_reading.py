@@ -92,7 +92,7 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
             {"design": "list", "factors": {"friction.mu": [0.1, 0.2], "command.vx": [0.1]}},
             ["different lengths", 'design = "grid"'],
         ),
-        ({"variation": "yes"}, ["variation", "got 'yes'", "leave the quotes out"]),
+        ({"variation": "yes"}, ["variation", "got 'yes'", "true or false"]),
         (
             {"factors": {"gains.hold.path_rate": {"values": [1.0], "unit": "s"}}},
             ["not a gain's value", "leave the unit out"],
@@ -119,14 +119,14 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
         ),
         (
             optimisation(training={"seeds": 3}),
-            ["optimise.training.scenarios", "missing key", 'scenarios = ["walk_flat"]'],
+            ["optimise.training.scenarios", "missing key", "add `scenarios = ...`"],
         ),
         (
             {"factors": {"gains.hold.path_rate": [math.nan]}},
             ["factors.gains.hold.path_rate", "got nan", "finite number"],
         ),
         ({"factors": {"gains.hold.ground_time": [0.0]}}, ["not a gain's value", "got 0.0", "> 0"]),
-        ({"seeds": {"first": 2**63 - 2, "count": 5}}, ["seeds.first", "<="]),
+        ({"seeds": {"first": 2**63 - 2, "count": 5}}, ["seeds", "within 64 bits"]),
         (
             {"factors": {"friction.mu": [0.3], "friction": {"mu": [0.4]}}},
             ["given twice", "friction.mu", "take one away"],

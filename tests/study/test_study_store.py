@@ -9,8 +9,8 @@ import random
 import signal
 import subprocess
 import time
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ from studies import (
     stored_count,
     stored_rows,
     study_of,
+    watched,
     write_rows,
 )
 from study_runners import Counting, Slow
@@ -160,10 +161,9 @@ def test_the_report_of_a_study_that_runs_has_the_runs_so_far(
     monkeypatch.setattr(store_module, "FLUSH_SECONDS", 0.0)
     study, seen = study_of({**SMALL, **KINEMATIC}), list[int]()
 
-    def start(_total: int, _done: int) -> Any:
-        return lambda _more, _lost: seen.append(read_results(tmp_path).runs)
-
-    run_study(study, tmp_path, options=Options(fmu=athena_fmu, runner=Slow, workers=2), start=start)
+    options = Options(fmu=athena_fmu, runner=Slow, workers=2)
+    show = watched(lambda: seen.append(read_results(tmp_path).runs))
+    run_study(study, tmp_path, options=options, progress=show)
     assert seen == sorted(seen)
     assert 0 < seen[0] < seen[-1] == 9
 
@@ -218,17 +218,19 @@ def test_progress_counts_new_runs_and_those_that_did_not_walk(
     athena_fmu: Path, tmp_path: Path
 ) -> None:
     study = study_of({**KINEMATIC, "seeds": 2, "factors": {"friction.mu": [0.17, 0.5]}})
-    counts, begun = list[tuple[int, int]](), list[tuple[int, int]]()
+    counts, totals = list[tuple[int, int]](), list[int]()
 
-    def start(total: int, done: int) -> Any:
-        begun.append((total, done))
-        return lambda done, failed: counts.append((done, failed))
+    @contextmanager
+    def show(total: int) -> Iterator[Any]:
+        totals.append(total)
+        yield lambda done, failed: counts.append((done, failed))
 
     options = Options(runner=Counting, workers=0, fmu=athena_fmu)
-    run_study(study, tmp_path, options=options, start=start)
-    run_study(study, tmp_path, options=options, start=start)
-    assert begun == [(4, 0), (4, 4)]
-    assert counts[-1] == (4, 2)
+    run_study(study, tmp_path, options=options, progress=show)
+    assert (counts[0], counts[-1]) == ((0, 0), (4, 2))
+    run_study(study, tmp_path, options=options, progress=show)
+    assert counts[-1] == (4, 0)  # nothing was left to run
+    assert totals == [4, 4]
 
 
 # The metadata of result files say what made them, whoever ran it.

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from dask_cluster import dask_scheduler, restarting_workers
 from gains import make_gains
-from studies import KINEMATIC, SMALL, rows, run_quietly, study_of
+from studies import KINEMATIC, SMALL, rows, run_quietly, study_of, watched
 from study_runners import DEATHS_FILE, Buggy, Slow
 
 from hexapod_cosim.cosim.master.loop import FAILED
@@ -112,7 +112,7 @@ def test_workers_killed_from_outside_cost_no_run(athena_fmu: Path, tmp_path: Pat
     study = study_of({**KINEMATIC, "seeds": 100, "factors": {"friction.mu": [0.3, 0.5]}})
     killed: list[int] = []
 
-    def tell(_more: int, _lost: int) -> None:
+    def kill_two() -> None:
         if len(killed) < 2:
             victim = next(iter(_children() - set(killed)))
             os.kill(victim, signal.SIGKILL)
@@ -122,7 +122,7 @@ def test_workers_killed_from_outside_cost_no_run(athena_fmu: Path, tmp_path: Pat
         study,
         tmp_path / "out",
         options=Options(runner=Slow, fmu=athena_fmu, workers=2),
-        start=lambda _total, _done: tell,
+        progress=watched(kill_two),
     )
     assert len(killed) == 2
     assert all(row["walked"] for row in rows(tmp_path / "out"))

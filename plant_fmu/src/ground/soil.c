@@ -68,21 +68,8 @@ int hx_soil_row_error(const double row[13]) {
   return -1;
 }
 
-/* ---- one foot ---- */
-
-/* Returns the pack that holds one soil. */
-static hxSoils only(const hxSoil *soil) {
+double hx_soil_plastic_depth(const hxSoil *soil, double z) {
   hxSoils soils;
   memcpy(&soils, soil, sizeof soils);
-  return soils;
-}
-
-double hx_soil_virgin(const hxSoil *soil, double z) {
-  const hxSoils soils = only(soil);
-  return hx_virgin(&soils, z).force;
-}
-
-double hx_soil_plastic_depth(const hxSoil *soil, double z) {
-  const hxSoils soils = only(soil);
   return hx_plastic_depth(&soils, z, hx_virgin(&soils, z));
 }

@@ -45,9 +45,6 @@ void hx_soil_from_row(const double row[13], const hxSoilShape *shape, hxSoil *so
 /* Returns the first of these columns that is not in its range, -1 if there is none. */
 int hx_soil_row_error(const double row[13]);
 
-/* Returns F_v(z), the force of a first monotone loading, N (eq. 40-43). */
-double hx_soil_virgin(const hxSoil *soil, double z);
-
 /* Returns the depth that stays when depth z is unloaded, z - F_v(z)/(A Ke) >= 0 (eq. 44). */
 double hx_soil_plastic_depth(const hxSoil *soil, double z);
 

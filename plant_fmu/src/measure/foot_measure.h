@@ -231,7 +231,7 @@ static inline hxReal hx_cone_place(hxReal share) {
 }
 
 static inline int hx_has_cone(const hxModel *model) {
-  return (model->mu > 0.0 && model->friction_law != HX_FRICTION_NONE) || model->has_soil;
+  return (model->mu > 0.0 && hx_friction_kind(model->friction_law).has_friction) || model->has_soil;
 }
 
 /* Returns the largest impulse of friction, on soil of shear (eq. 46), under a normal impulse. */

@@ -127,7 +127,7 @@ static void check_relations(hxChecker *c, const hxDefinition *d) {
   if (d->friction.mu_static != 0.0 && d->friction.mu_static < d->friction.mu)
     hx_check_fail(c, "friction.mu_static", d->friction.mu_static,
                   "at least friction.mu, or 0, which means the same");
-  else if (d->friction.mu_static > d->friction.mu && d->friction.law == HX_FRICTION_NONE)
+  else if (d->friction.mu_static > d->friction.mu && !hx_friction_kind(d->friction.law).has_friction)
     hx_check_fail(c, "friction.mu_static", d->friction.mu_static,
                   "0 or friction.mu with friction.law none, which has no friction");
   if (d->body.self_contact == HX_SELF_FORCE && d->body.knee_radius == 0.0 &&
