@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-
-from fmpy.ssp.ssd import read_ssd
+from xml.etree import ElementTree
 
 from hexapod_cosim.cosim.common.archives import unpack
+from hexapod_cosim.cosim.export.ssp import SSD
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.models import HexapodError, load_robot
@@ -31,8 +31,8 @@ def read_package(path: Path, folder: Path) -> Package:
     another robot, which the loop cannot connect.
     """
     unpack(path, folder)
-    structure = read_ssd(str(path), validate=False)
-    names = tuple(one.name for one in structure.system.elements)
+    structure = ElementTree.parse(folder / "SystemStructure.ssd")
+    names = [one.get("name", "") for one in structure.iter(f"{{{SSD}}}Component")]
     if sorted(names) != sorted(COMPONENTS):
         raise HexapodError(
             "a package that the loop cannot connect",
@@ -42,8 +42,8 @@ def read_package(path: Path, folder: Path) -> Package:
             where=str(path),
         )
     plant, controller = (folder / "resources" / f"{name}.fmu" for name in COMPONENTS)
-    stop = structure.defaultExperiment.stopTime if structure.defaultExperiment else None
-    lasts = [f"duration={float(stop)!r}"] if stop else []
+    stops = [one.get("stopTime") for one in structure.iter(f"{{{SSD}}}DefaultExperiment")]
+    lasts = [f"duration={float(stop)!r}" for stop in stops if stop]
     return Package(plant, controller, [*lasts, *_commands(controller), *_parameters(plant, path)])
 
 

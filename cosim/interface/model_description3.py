@@ -230,7 +230,10 @@ def _add_structure(root: Element, interface: Interface, variables: tuple[Array, 
         ("EventIndicator", indicators, interface.depends),
     ):
         for array in arrays_:
-            _add_unknown(structure, title, array, _knowns(array, depends, references))
+            causalities = ("input", "parameter") if title == "InitialUnknown" else ("input",)
+            known = {one.reference for one in variables if one.first.causality in causalities}
+            known |= set() if title == "InitialUnknown" else {one.reference for one in states}
+            _add_unknown(structure, title, array, _knowns(array, depends, references, known))
 
 
 def _arrays_of(
@@ -243,23 +246,25 @@ def _arrays_of(
 
 
 def _knowns(
-    array: Array, depends: Callable[[str], tuple[str, ...] | None], references: Mapping[str, int]
-) -> list[int] | None:
-    """Returns the references of the arrays that some element depends on; None: all."""
+    array: Array,
+    depends: Callable[[str], tuple[str, ...] | None],
+    references: Mapping[str, int],
+    everything: Iterable[int],
+) -> list[int]:
+    """Returns the references of the arrays that some element depends on. All of them are written
+    out, because CasADi reads no unknown without dependencies.
+    """
     found: set[int] = set()
     for element in array.elements:
         knowns = depends(element.name)
         if knowns is None:
-            return None
+            return sorted(everything)
         found |= {references[known] for known in knowns}
     return sorted(found)
 
 
-def _add_unknown(
-    structure: Element, title: str, array: Array, knowns: Iterable[int] | None
-) -> None:
-    """Adds an unknown. Without stated dependencies it depends on all knowns."""
+def _add_unknown(structure: Element, title: str, array: Array, knowns: Iterable[int]) -> None:
+    """Adds an unknown with its dependencies."""
     attributes = {"valueReference": str(array.reference)}
-    if knowns is not None:
-        attributes["dependencies"] = " ".join(map(str, knowns))
+    attributes["dependencies"] = " ".join(map(str, knowns))
     SubElement(structure, title, attributes)
