@@ -15,54 +15,31 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.compliant import Compliant, PresentStep, sense
+from hexapod_cosim.controller.checks import (
+    ControllerError,
+    check_law,
+    check_period,
+    gains_warnings,
+)
+from hexapod_cosim.controller.comply.compliant import Compliant, sense
 from hexapod_cosim.controller.comply.paper import Paper, Step
 from hexapod_cosim.controller.comply.posture import LEVEL
 from hexapod_cosim.controller.gains import Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plan import WalkPlan
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, rows_of
+from hexapod_cosim.controller.sense.health import Health
 from hexapod_cosim.controller.signals import Diagnostics, JointCommand, Measurement
+from hexapod_cosim.controller.walk.absence import gait_without
 from hexapod_cosim.controller.walk.command import BodyCommand
 from hexapod_cosim.controller.walk.fade import Fade
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.gait_clock import NO_LEG
 from hexapod_cosim.controller.walk.kinematics import LegSolver
-from hexapod_cosim.models import HexapodError, Robot, unknown_name
+from hexapod_cosim.models import Robot
 
 ALL_PARTS = Parts()
-LAWS = ("compliant", "paper")  # what the feet's forces do; without gains control is kinematic
 CLOCK_TOLERANCE = 0.01  # 1    of a period, between the time given and the steps counted
-
-
-class ControllerError(HexapodError):
-    """The controller cannot be built, or was called at a wrong time."""
-
-
-def _check_period(period: float, gait: Gait) -> None:
-    """Raises ControllerError unless stance and swing of the gait are longer than the period [s]."""
-    shorter = gait.period * min(gait.duty, 1.0 - gait.duty)
-    if not 0.0 < period < shorter:
-        raise ControllerError(
-            "impossible controller period",
-            got=period,
-            expected=f"0 < period < {shorter:g} s, the gait's shorter phase",
-            fix="shorten the period or slow the gait",
-        )
-
-
-def _check_law(law: str) -> None:
-    """Raises HexapodError for an unknown name."""
-    if law not in LAWS:
-        raise unknown_name("law", law, LAWS)
-
-
-def gains_warnings(robot: Robot, gains: Gains | None, period: float) -> tuple[str, ...]:
-    """Returns warnings of gains for another robot or period [s], and the caveats of the gains."""
-    if gains is None:
-        return ()
-    mismatch = gains.mismatch(robot, period=period)
-    return (*(() if mismatch is None else (mismatch,)), *gains.caveats)
 
 
 class Controller(Stateful):
@@ -73,7 +50,10 @@ class Controller(Stateful):
     an impossible period.
     """
 
-    STATE = ("plan", "compliant", "paper", "fade", "_start", "_count", "_shown", "_next")
+    STATE = (
+        "plan", "compliant", "paper", "fade", "health", "_start", "_count", "_shown", "_next",
+        "_back",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -85,13 +65,16 @@ class Controller(Stateful):
         parts: Parts = ALL_PARTS,
         law: str = "compliant",
     ) -> None:
-        _check_period(period, gait)
-        _check_law(law)
+        check_period(period, gait)
+        check_law(law)
         self.robot, self.period, self.gains, self.parts = robot, period, gains, parts
         self.legs, self.stance, self.law = LegSolver(robot), robot.stance, law
         self.fade = Fade(period=period)
+        self.health = Health(robot, gains, legs=self.legs, period=period)
+        self._asked = gait  # that was asked for; without a leg, another one is walked
         self._build(gait)
         self._next: Gait | None = None  # that the legs change to
+        self._back: int | None = None  # leg that is taken back into service then
         self.warnings = gains_warnings(robot, gains, period)
         self._out = JointCommand()
         self.diagnostics = Diagnostics()
@@ -124,8 +107,15 @@ class Controller(Stateful):
             self.compliant.present = laws.present
         if self.paper is not None and paper is not None:
             self.paper.restore(paper.save())
-        self.plan.adopt(plan)
-        self._next = None
+        self.plan.adopt(plan, self._back)
+        self._next = self._back = None
+
+    def _change(self, back: int | None = None) -> None:
+        """Begins a change to the gait of the legs in service, with one that comes back (C58)."""
+        absent = self.plan.absence.legs & (np.arange(LEGS) != back)
+        backwards = self.plan.ramp.target.vx < 0.0
+        self._next, self._back = gait_without(self._asked, absent, backwards=backwards), back
+        self.plan.end()
 
     def change_gait(self, gait: Gait) -> None:
         """Changes the gait without a jump of the feet, while the robot walks (C55).
@@ -134,10 +124,27 @@ class Controller(Stateful):
         gait begins with the feet where they are. Raises ControllerError for a gait that is too fast
         for the period, and then changes nothing.
         """
-        _check_period(self.period, gait)
-        self._next = gait
-        self.plan.end()
+        check_period(self.period, gait)
+        self._asked = gait
+        self._change()
         self._adopt()
+
+    def _watch(self, measurement: Measurement) -> None:
+        """Takes legs that are lost out of service, before the present step is planned (C57)."""
+        health = self.health
+        health.step(measurement.angle, sense(measurement, LEVEL), self._out)
+        if self.plan.lose(health.lost, self._out):
+            self._change()
+
+    def _fold(self, measurement: Measurement) -> None:
+        """Folds legs out of service away, and takes back one that works again (C58)."""
+        absence = self.plan.absence
+        if not absence.legs.any():
+            return
+        there = absence.fold(measurement.angle, self.health, self._out)
+        self.diagnostics.unreachable[...] &= ~absence.legs
+        if there.any() and self._back is None:
+            self._change(int(np.argmax(there)))
 
     def change_control(self, gains: Gains | None, law: str = "compliant") -> None:
         """Changes the control while the robot walks: arguments as for the constructor.
@@ -147,10 +154,10 @@ class Controller(Stateful):
         next control begins as after reset(). Raises HexapodError for an unknown law, and then
         changes nothing.
         """
-        _check_law(law)
+        check_law(law)
         self.gains, self.law = gains, law
         self.warnings = gains_warnings(self.robot, gains, self.period)
-        plan = self.plan
+        plan, self.health = self.plan, Health(self.robot, gains, legs=self.legs, period=self.period)
         self._build(self.gait)
         if self._start is None:
             self.reset()
@@ -185,7 +192,7 @@ class Controller(Stateful):
                 planned=shown.planned,
                 height=plan.lift(),
                 rise=feet.rise,
-                swinging=plan.paths.clock.swinging,
+                swinging=plan.paths.clock.swinging | plan.absence.legs,
                 angle=measurement.angle,
                 force=sense(measurement, LEVEL),
             )
@@ -193,35 +200,7 @@ class Controller(Stateful):
         joints = paper.actuate(feet)
         out.angle_ref[...], out.speed_ref[...] = joints.angle, joints.speed
         shown.unreachable[...] = joints.unreachable
-        shift = paper.shift
-        self._show(rows_of(shift.real, shift.imag, paper.lift), NO_LEG)
-
-    def _present_step(self, compliant: Compliant) -> PresentStep:
-        """Returns planned loads and geometry of the present step for the laws (C15 to C20)."""
-        plan, now, speed = self.plan, self.plan.now, self._out.speed_ref
-        laden = plan.planner.laden()
-        demand = compliant.dynamics.demand(plan.motion(), speed, now.posture, laden)
-        feet = now.plane + now.shift
-        load = compliant.plan(
-            demand,
-            now.activation,
-            feet=feet,
-            height=plan.lift(),
-            rise=now.feet.rise,
-            swinging=plan.paths.clock.swinging,
-            awaited=plan.paths.clock.awaited,
-            overspeed=bool((np.abs(speed) >= self.legs.speed_max).any()),
-        )
-        return PresentStep(
-            load=load,
-            climb=self.legs.speeds(now.pose, 0.0, 1.0),
-            value=now.value,
-            posture=now.posture,
-            plane=now.feet.plane,
-            torso=now.torso,
-            height=now.height,
-            rolled=now.feet.rolled,
-        )
+        self._show(rows_of(paper.shift.real, paper.shift.imag, paper.lift), NO_LEG)
 
     def _show(self, shift: Array, fallback: Mask) -> None:
         """Copies corrections of the feet (6, 3) [m] and fallbacks (6,) into the diagnostics."""
@@ -234,7 +213,10 @@ class Controller(Stateful):
 
     def reset(self) -> None:
         """Puts the robot in its stance and clears all memory; the next step is the first."""
-        for part in (self.compliant, self.paper, self.fade, self.plan):
+        self._back = None
+        if self.gait != self._asked:
+            self._build(self._asked)
+        for part in (self.compliant, self.paper, self.fade, self.health, self.plan):
             if part is not None:
                 part.reset()
         self._start, self._count, self._next = None, 0, None
@@ -243,7 +225,8 @@ class Controller(Stateful):
 
     def save(self) -> dict[str, Any]:
         """Returns the state that restore() takes; it includes gait and control."""
-        return super().save() | {"gait": self.gait, "control": (self.gains, self.law)}
+        gaits = {"gait": self.gait, "asked": self._asked}
+        return super().save() | gaits | {"control": (self.gains, self.law)}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restores a state returned by save(); the following steps repeat exactly."""
@@ -251,6 +234,7 @@ class Controller(Stateful):
         if (state["gait"], state["control"]) != (self.gait, control):
             self.gains, self.law = state["control"]
             self._build(state["gait"])
+        self._asked = state["asked"]
         own = {name: value for name, value in state.items() if name in self.STATE}
         super().restore(own)
         self._follow_paths()
@@ -284,10 +268,15 @@ class Controller(Stateful):
                 self._start = t
             else:
                 self._count += 1
+                if self.gains is not None:
+                    self._watch(measurement)
                 self.plan.advance(command_changed)
             self._follow_paths()
             self._apply_laws(measurement)
             self.fade.step(self.legs, self._out)
+            self._fold(measurement)
+            self.diagnostics.absent[...] = self.plan.absence.legs
+            self.diagnostics.faulty[...] = self.health.faulty.T
             self._adopt()
         return self._out
 
@@ -296,7 +285,7 @@ class Controller(Stateful):
         if self.paper is not None:
             self._correct_paths(self.paper, measurement)
         if self.compliant is not None:
-            step = self._present_step(self.compliant)
+            step = self.plan.present_step(self._out.speed_ref)
             raised = self.compliant.step(step, measurement, self._out)
             still = np.zeros(LEGS)
             self._show(rows_of(still, still, raised), self.compliant.laws.fallback)

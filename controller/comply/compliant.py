@@ -173,16 +173,18 @@ class Compliant(Stateful):
             period=self.period,
         )
 
-    def lowered(self, phase: Array, plane: Plane, clock: GaitClock) -> tuple[Array, Array]:
+    def lowered(
+        self, phase: Array, plane: Plane, clock: GaitClock, presence: Array
+    ) -> tuple[Array, Array]:
         """Returns the activations of the legs (6,) and the lowering of their feet (6,) [m].
 
         phase: (6,) of the legs [1]; plane: (6,) feet x + i y, walking frame [m]; clock: of the
-        gait, in the section of the step.
+        gait, in the section of the step; presence: (6,) factors of the legs [1].
         """
         activation = self.support.activation(
             phase, clock.stayed, clock.stays, walking=clock.walking
         )
-        activation = np.where(clock.awaited, 0.0, activation)
+        activation = np.where(clock.awaited, 0.0, activation * presence)
         return activation, self.support.lowering(plane, activation)
 
     # ------------------------------------------------------------------------------- steering

@@ -33,7 +33,7 @@ from hexapod_cosim.cosim.design.stance import (
     with_stance,
 )
 from hexapod_cosim.cosim.export.robot_package import SPEED
-from hexapod_cosim.cosim.results.facts import OF_FMU, GaitChoice
+from hexapod_cosim.cosim.results.facts import OF_FMU, OWN_CONTROLLER, GaitChoice
 from hexapod_cosim.cosim.run.designs import StanceChange, kept_stance
 from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.reach import reaches
@@ -99,13 +99,14 @@ def select_gait(
     settings = dict(scenario.settings.get("gait", {}))
     plain = GaitSelection(robot=robot, gait=make_gait(robot, **settings), stance=OWN)
     if scenario.stance != CHOSEN:
-        if scenario.names_walk:
-            return _named(scenario, plain, bare)
         control = control_of(scenario.control)
+        if scenario.names_walk:
+            named = _named(scenario, plain, bare)
+            return named if control.is_builtin else replace(named, chosen_by=OWN_CONTROLLER)
         if control.kind == FMU and control.path is not None:
             return _of_fmu(plain, control.path)
         if not control.chooses:
-            return replace(plain, chosen_by=BY_ROBOT)
+            return replace(plain, chosen_by=BY_ROBOT if control.is_builtin else OWN_CONTROLLER)
         plain = replace(plain, chosen_by=BY_CONTROL)
     chosen = _chosen(scenario.commands, plain, bare, settings)
     if plain.chosen_by == BY_CONTROL and _designed_for(gains, plain.robot, chosen.robot):
@@ -126,7 +127,7 @@ def _of_fmu(plain: GaitSelection, path: Path) -> GaitSelection:
     """Returns the walk with stance and gait of a controller FMU, as far as it has them."""
     found = walk_of_fmu(path)
     gait = make_gait(plain.robot, **found.gait) if found.gait else plain.gait
-    own = replace(plain, gait=gait, chosen_by=BY_CONTROL if found.gait else BY_ROBOT)
+    own = replace(plain, gait=gait, chosen_by=BY_CONTROL if found.gait else OWN_CONTROLLER)
     if found.stance is None or np.array_equal(found.stance, plain.robot.stance):
         return own
     legs = tuple(

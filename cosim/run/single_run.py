@@ -34,6 +34,7 @@ from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.facts import PYTHON, FmuIdentity, Result, RobotIdentity, RunFacts
 from hexapod_cosim.cosim.results.locomotion import (
     describe_fall,
+    found_faults,
     is_sent_ahead,
     locomotion_of,
     missed_end,
@@ -128,6 +129,12 @@ def _make_recorder(plan: RunPlan, signals: Signals, controller: JointController)
     return recorder
 
 
+def _events(scenario: Scenario, outcome: Outcome) -> tuple[dict[str, Any], ...]:
+    """Returns the events of the scenario and those that the controller found, in order of time."""
+    events = [*event_log(scenario, outcome.simulated), *found_faults(outcome.judged)]
+    return tuple(sorted(events, key=lambda event: float(event["time"])))
+
+
 def make_result(
     plan: RunPlan,
     outcome: Outcome,
@@ -166,7 +173,7 @@ def make_result(
         platform=f"{sys.platform} {platform.machine()}",
         controller=control_facts(scenario, law),
         warnings=(*warnings, *_warnings(plan, outcome, view, fall)),
-        events=tuple(event_log(scenario, outcome.simulated)),
+        events=_events(scenario, outcome),
         gains=None if setup.gains is None else setup.gains.as_facts(),
         walk=locomotion_of(view, upright=not fall, missed="" if arrives else missed_end(metrics)),
         drawn=None if plan.drawn is None else plan.drawn.as_facts(),

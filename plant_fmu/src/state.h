@@ -324,36 +324,12 @@ static inline void hx_copy_gears(hxMoment *to, const hxMoment *from) {
   memcpy(to->motor_speed, from->motor_speed, sizeof to->motor_speed);
 }
 
-/* Copies the state of contacts on rigid ground: nothing else of it changes there. */
-static inline void hx_copy_rigid_contacts(hxContactState *to, const hxContactState *from) {
-  memcpy(to, from, offsetof(hxContactState, on_soil));
-  memcpy(to->cell, from->cell, sizeof to->cell);
-  memcpy(to->nearest, from->nearest, sizeof to->nearest);
-}
-
-/* Copies the state of the first row of contacts: nothing else of it changes on rigid planes if the
- * model has no other rows. */
-static inline void hx_copy_foot_contacts(hxContactState *to, const hxContactState *from) {
-  memcpy(to->closed, from->closed, sizeof to->closed[0]);
-  memcpy(to->damping, from->damping, sizeof to->damping[0]);
-  memcpy(to->impact_speed, from->impact_speed, sizeof to->impact_speed[0]);
-  memcpy(to->stiffness, from->stiffness, sizeof to->stiffness[0]);
-  memcpy(to->mu, from->mu, sizeof to->mu[0]);
-  memcpy(to->static_rise, from->static_rise, sizeof to->static_rise[0]);
-}
-
 /* Copies the parts of a state that a step of this model changes. */
 static inline void hx_copy_state(const hxModel *model, hxState *to, const hxState *from) {
   const size_t rest = offsetof(hxState, evaluations);
-  const int plain = model->listed == 1 && !model->terrain && !model->has_soil;
   memcpy(to, from,
          model->elastic ? offsetof(hxState, contact) : offsetof(hxState, motion.deflection));
-  if (plain)
-    hx_copy_foot_contacts(&to->contact, &from->contact);
-  else if (!model->has_soil)
-    hx_copy_rigid_contacts(&to->contact, &from->contact);
-  else
-    to->contact = from->contact;
+  to->contact = from->contact;
   memcpy((char *)to + rest, (const char *)from + rest, offsetof(hxState, moment.contact[1]) - rest);
   for (int k = 1; k < model->listed; ++k)
     to->moment.contact[model->row[k]] = from->moment.contact[model->row[k]];

@@ -20,7 +20,7 @@ NAMES = {
     "path": r"walk\.hold|\bHold\b|hx_hold_|hxHold|HoldGains|/hold\.h",
     "sway": r"\bsway\b|\bSway\b|hx_sway_|hxSway",
     "fallback": r"sense\.trust|\bTrust\b|hx_trust_|hxTrust|SensorWatch|hx_sensor_watch|/trust\.h",
-    "limits": r"LimitGains|limits\.torque",
+    "limits": r"\bLimitGains\b",
     "squeeze": r"planned_squeeze|PlannedSqueeze",
     "paper_share": r"\bpaper_share\b",
     "paper_pid": r"\bpaper_pid\b",

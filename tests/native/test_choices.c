@@ -262,8 +262,8 @@ static void every_law_of_contact_and_every_method_keeps_them(void) {
     d.contact.law = law, d.initial.position[2] += 0.01;
     holds(&(hxChoice){"law of contact", nothing, 0, 0.01}, &d);
   }
-  for (int method = HX_METHOD_ROSW3; method <= HX_METHOD_RK4; ++method)
-    for (int fixed = method == HX_METHOD_RK4; fixed < 2; ++fixed) {
+  for (int method = HX_METHOD_ROSW3; method <= HX_METHOD_DP54; ++method)
+    for (int fixed = 0; fixed < 2; ++fixed) {
       hxDefinition d;
       hx_definition_default(&d);
       d.solver.method = method, d.solver.step = fixed ? 2e-4 : 0.0;

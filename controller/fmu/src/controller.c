@@ -10,7 +10,9 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
   model->paper = definition->control == HX_CONTROL_PAPER;
   hx_walk_plan_compile(definition, &model->plan);
   if (model->paper) hx_paper_compile(definition, &model->corrections);
+  model->feels = definition->control != HX_CONTROL_KINEMATIC;
   hx_fade_compile(definition->period, &model->fade);
+  hx_health_compile(definition, &model->health);
 }
 
 /* ----------------------------------------------------------------- change of gait and control */
@@ -18,14 +20,15 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
 void hx_controller_adopt(hxControllerModel model[2], hxControllerState *state) {
   hxControllerModel *next = &model[1 - state->model];
   if (!state->changing || !hx_walk_plan_ended(&state->plan)) return;
-  hx_walk_plan_adopt(&next->plan, &model[state->model].plan, &state->plan);
+  hx_walk_plan_adopt(&next->plan, &model[state->model].plan, state->back - 1, &state->plan);
   state->model = 1 - state->model;
-  state->changing = 0;
+  state->changing = state->back = 0;
 }
 
-void hx_controller_change(hxControllerModel model[2], hxControllerState *state) {
+void hx_controller_change(hxControllerModel model[2], int back, hxControllerState *state) {
   state->changing = 1;
-  hx_walk_plan_end(&state->plan);
+  state->regait = 0;
+  state->back = back;
   hx_controller_adopt(model, state);
 }
 
@@ -37,6 +40,7 @@ void hx_controller_exchange(hxControllerModel *model, const hxFootPathsModel *be
   hx_fade_begin(&model->fade, output, &state->fade);
   if (planner->compliant) hx_compliant_reset(&planner->laws, &state->compliant);
   memset(&state->paper, 0, sizeof state->paper);
+  memset(&state->health, 0, sizeof state->health);
   memset(output->shift, 0, sizeof output->shift);
   memset(output->lift, 0, sizeof output->lift);
   memset(output->fallback, 0, sizeof output->fallback);
@@ -79,15 +83,18 @@ static void correct_paths(const hxControllerModel *model, const hxControllerInpu
                       (const double (*)[3])output->planned,
                       {0.0},
                       {0.0},
-                      plan->paths.clock.swinging,
+                      NULL,
                       input->angle,
                       {{0.0}}};
   hxPlane plane[HX_LEGS], velocity[HX_LEGS];
   double height[HX_LEGS];
+  int swinging[HX_LEGS];
   memset(&level, 0, sizeof level);
   level.level = 1;
   hx_sense(input, &level, step.force);
+  step.swinging = swinging;
   for (int k = 0; k < HX_LEGS; ++k) {
+    swinging[k] = plan->paths.clock.swinging[k] || plan->absence.legs[k];
     hx_walk_plan_foot(&model->plan, plan, k, &plane[k], &height[k], &velocity[k], &step.rise[k]);
     step.height[k] = hx_walk_plan_lift(&model->plan, plan, k);
   }
@@ -102,39 +109,34 @@ static void correct_paths(const hxControllerModel *model, const hxControllerInpu
   }
 }
 
-/* Fills the planned loads and the geometry of the present step for the laws (C15 to C20). */
-static void present_step(const hxControllerModel *model, hxControllerState *state,
-                         hxPresentStep *present) {
-  const hxStepPlanner *planner = &model->plan.planner;
-  hxWalkPlan *plan = &state->plan;
-  const hxPlannedStep *now = hx_walk_plan_step(plan, 0);
-  const hxNeighbours motion = hx_walk_plan_motion(plan);
-  const hxControllerOutput *output = &state->output;
-  hxLoadPlan *load = &present->load;
-  double height[HX_LEGS];
-  hxDemand demand;
-  hx_inverse_dynamics_demand(&planner->laws.dynamics, planner->leg, &motion, output->speed_ref,
-                             &now->posture, hx_step_planner_laden(planner, &state->compliant),
-                             &demand);
-  load->overspeed = 0;
-  for (int k = 0; k < HX_LEGS; ++k) {
-    load->feet[k] = hx_plane_add(now->plane[k], now->shift[k]);
-    height[k] = hx_walk_plan_lift(&model->plan, plan, k);
-    load->shares.activation[k] = now->activation[k];
-    load->swinging[k] = plan->paths.clock.swinging[k];
-    load->awaited[k] = plan->paths.clock.awaited[k];
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
-      load->overspeed |= fabs(output->speed_ref[k][joint]) >= planner->leg[k].speed_max;
-    hx_leg_solver_speeds(&planner->leg[k], &now->pose[k], hx_plane(0.0, 0.0), 1.0,
-                         present->climb[k]);
-  }
-  hx_compliant_plan(&planner->laws, &state->compliant, height, now->feet.rise, &demand, load);
-  present->value = now->value;
-  present->posture = &now->posture;
-  present->plane = now->feet.plane;
-  present->torso = now->torso;
-  present->height = now->height;
-  present->rolled = now->feet.rolled;
+/* -------------------------------------------------------------------------------- lost legs */
+
+/* Takes legs that are lost out of service, before the present step is planned (C57). */
+static void watch(const hxControllerModel *model, const hxControllerInput *input,
+                  hxControllerState *state) {
+  hxPosture level;
+  double force[HX_LEGS][3];
+  memset(&level, 0, sizeof level);
+  level.level = 1;
+  hx_sense(input, &level, force);
+  hx_health_step(&model->health, model->plan.planner.leg, input->angle, (const double (*)[3])force,
+                 &state->output, &state->health);
+  if (!hx_walk_plan_lose(&model->plan, &state->health, &state->output, &state->plan)) return;
+  state->regait = 1;
+  state->changing = state->back = 0;
+}
+
+/* Folds legs out of service away, and takes back one that works again (C58). */
+static void fold(const hxControllerModel *model, const hxControllerInput *input,
+                 hxControllerState *state) {
+  const int back = hx_absence_fold(&model->plan.absent, model->plan.planner.leg, input->angle,
+                                   &state->health, &state->plan.absence, &state->output);
+  memcpy(state->output.absent, state->plan.absence.legs, sizeof state->output.absent);
+  memcpy(state->output.faulty, state->health.faulty, sizeof state->output.faulty);
+  if (back < 0 || state->back) return;
+  state->back = back + 1;
+  state->regait = 1;
+  hx_walk_plan_end(&state->plan);
 }
 
 /* -------------------------------------------------------------------------------------- ticks */
@@ -157,15 +159,18 @@ void hx_controller_tick(const hxControllerModel *model, const hxControllerInput 
   const int command_changed = hx_command_ramp_aim(&model->plan.ramp, command, &state->plan.ramp);
   hxPresentStep present;
   /* the first tick commands the stance, whatever the input */
+  if (state->tick > 0 && model->feels) watch(model, input, state);
   if (state->tick > 0)
     hx_walk_plan_advance(&model->plan, command_changed, &state->compliant, &state->plan);
   ++state->tick;
   follow_paths(model, state);
   if (model->paper) correct_paths(model, input, state);
   if (planner->compliant) {
-    present_step(model, state, &present);
+    hx_walk_plan_present_step(&model->plan, &state->compliant, state->output.speed_ref,
+                              &state->plan, &present);
     hx_compliant_step(&planner->laws, planner->leg, &present, input, &state->compliant,
                       &state->output);
   }
   if (state->fade.left) hx_fade_step(&model->fade, planner->leg, &state->fade, &state->output);
+  fold(model, input, state);
 }

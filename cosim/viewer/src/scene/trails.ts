@@ -130,7 +130,11 @@ interface Piece {
   readonly colour: Color;
 }
 
-function piecesOf({ place, rows, slipped }: StancePhase, relief: Relief, enlarged: number): Piece[] {
+function piecesOf(
+  { place, rows, slipped }: StancePhase,
+  relief: Relief,
+  enlarged: number,
+): Piece[] {
   const points = slipped.map(([x, y]) => [place.x + enlarged * x, place.y + enlarged * y]);
   // a trail on a block stays on it: a longer one would climb walls that the foot did not
   const flat = relief.surface && !relief.surface.smooth;
