@@ -165,6 +165,14 @@ hxStatus hx_refuse_elastic_gears(char *message) {
 }
 
 hxStatus hx_definition_check_coordinates(const hxDefinition *d, char *message) {
+  if (d->servo.goal_speed_max > 0.0 || d->servo.overload_time > 0.0) {
+    if (message)
+      hx_print(message, HX_MESSAGE_SIZE,
+               "servo.goal_speed_max, servo.overload_time: got a firmware whose memory is no "
+               "continuous state; expected 0 in model exchange and for derivatives; set them to 0, "
+               "or use co-simulation and differences");
+    return HX_INVALID_ARGUMENT;
+  }
   return hx_has_elastic_gears(d) ? hx_refuse_elastic_gears(message) : HX_OK;
 }
 
