@@ -18,8 +18,8 @@ SANITIZER = rm -f $(REPORT).*; HEXAPOD_PRESET=sanitize ASAN_OPTIONS=detect_leaks
 	LD_PRELOAD=$$($(CC) -print-file-name=libasan.so)
 SANITIZED_END = || { cat $(REPORT).* 2>/dev/null; exit 1; }
 TYPING := build/typing/hexapod_cosim
-SOURCES := pyproject.toml packaging/CMakeLists.txt $(shell find fmi plant_fmu controller/fmu $(wildcard extensions/gym/policy_fmu extensions/gym/loop) cosim/master/src cosim/master/include -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts extensions/*/viewer/*.ts)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/*/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller/fmu/src/*.[ch] controller/fmu/src/*/*.[ch] controller/fmu/*.c controller/fmu/include/hexapod/*.h extensions/gym/policy_fmu/src/*.[ch] extensions/gym/policy_fmu/*.c extensions/gym/policy_fmu/include/hexapod/*.h cosim/master/src/*.[ch] cosim/master/include/hexapod/*.h extensions/gym/loop/src/*.[ch] extensions/gym/loop/include/hexapod/*.h extensions/live/wasm/*.[ch] tests/native/*.[ch] tests/native/probe/*.c tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
+SOURCES := pyproject.toml packaging/CMakeLists.txt $(shell find fmi plant_fmu controller/fmu $(dir $(wildcard extensions/*/*/CMakeLists.txt)) cosim/master/src cosim/master/include -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts extensions/*/viewer/*.ts)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/*/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller/fmu/src/*.[ch] controller/fmu/src/*/*.[ch] controller/fmu/*.c controller/fmu/include/hexapod/*.h extensions/*/*/src/*.[ch] extensions/*/*/*.[ch] extensions/*/*/include/hexapod/*.h cosim/master/src/*.[ch] cosim/master/include/hexapod/*.h tests/native/*.[ch] tests/native/probe/*.c tests/fuzz/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
 EMPTY :=
 TEST_ROOMS := $(subst $(EMPTY) $(EMPTY),:,$(filter-out tests/native tests/conftest.py,$(wildcard tests/[a-z]*[a-z])))
 SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_state fmi_values) $(wildcard tests/exchange/test_*.py) \
@@ -27,12 +27,12 @@ SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_stat
 COVERED := $(patsubst %,tests/%,fmi exchange plant native_control friction ground soil servos)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
-.PHONY: help setup demo test test-docs test-browser test-importers test-platforms \
+.PHONY: help help-extensions setup demo test test-docs test-browser test-importers test-platforms \
 	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short \
 	test-robots test-extensions \
 	test-wheels test-metadata wheels test-compilers fuzz fuzz-short lint-c check bench \
-	bench-quick bench-gym figures format generate \
-	fmu typing clean docs identify-campaign coverage lock audit
+	bench-quick format generate \
+	fmu typing clean docs coverage lock audit
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -58,9 +58,6 @@ help:
 	@echo "make check     formatters, linters, types, generated files, warnings of gcc and clang"
 	@echo "make lint-c    warnings of gcc and clang alone"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
-	@echo "make bench-gym  environment steps a second of the learning environments and of mujoco.rollout (1 min)"
-	@echo "make figures   the course, and the tables of the pages that compare controls: README.md, docs/ (10 min)"
-	@echo "make identify-campaign  20 robots with secret numbers, identified from logs of 6 s (10 min); ROBOTS, SECONDS, AT_A_TIME; goes on with out/identification_SECONDS.csv"
 	@echo "make docs      the documentation's site: build/docs/index.html (1 min)"
 	@echo "make format    formats C and Python"
 	@echo "make generate  generated/ of the FMUs from their interface.toml, and the picture of the rooms"
@@ -68,6 +65,11 @@ help:
 	@echo "make lock      .ci/requirements.txt: the versions of .ci/constraints.txt with the hashes of all files"
 	@echo "make audit     known vulnerabilities of these versions; needs the network"
 	@echo "make clean     removes what these made"
+	@$(MAKE) --no-print-directory --silent help-extensions
+
+help-extensions::
+
+-include $(wildcard extensions/*/targets.mk)
 
 setup: $(STAMP)
 
@@ -97,7 +99,7 @@ test-docs: setup
 	HEXAPOD_SITE=computed $(BIN)/python -m pytest -q tests/docs/test_docs.py -k "site or validation or reference"
 
 test-browser: setup
-	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/report/test_browser.py tests/live/test_live_browser.py
+	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s $(wildcard tests/*/test_*browser.py)
 
 test-importers: setup
 	$(BIN)/python -m tools.importers.compare
@@ -217,22 +219,8 @@ check: setup typing lint-c
 bench: setup
 	$(BIN)/python -m benchmarks.run
 
-bench-gym: setup
-	$(BIN)/python -m benchmarks.gym
-
 bench-quick: setup
 	$(BIN)/python -m benchmarks.run --quick
-
-figures: setup
-	$(BIN)/hexapod benchmark -o out/benchmark
-	$(BIN)/python -m benchmarks.pages out/benchmark
-
-ROBOTS ?= 20
-SECONDS ?= 6
-AT_A_TIME ?= 1
-identify-campaign: setup
-	PYTHONPATH=tests/support:tests/identify $(BIN)/python -m benchmarks.identification --robots $(ROBOTS) --seconds $(SECONDS) \
-		--workers $(AT_A_TIME) --table out/identification_$(SECONDS).csv
 
 docs: setup
 	rm -rf build/docs

@@ -19,7 +19,7 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
 
-from hexapod_cosim.extensions.gym.bench import bench, walking_action
+from benchmarks.environment_steps import bench, walking_action
 from hexapod_cosim.extensions.gym.settings import JOINTS, RATE, EnvSettings
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.mjcf import robot_to_mjcf

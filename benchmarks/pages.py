@@ -14,8 +14,6 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
-from PIL import Image
-
 from benchmarks import ROOT
 from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.results.side_by_side import Comparisons, compare_all
@@ -24,7 +22,6 @@ from hexapod_cosim.cosim.scenario.controls import parse_controls
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.extensions.course import texts
-from hexapod_cosim.extensions.course.report import FOLDER, STEM
 from hexapod_cosim.extensions.course.store import read_table
 from hexapod_cosim.extensions.course.table import Table
 
@@ -54,7 +51,6 @@ ROWS = {
     "slip_per_metre": ("slip per metre", 1e3, "mm/m"),
 }
 DETAILS = ("foot_error_swing", "height_rms", "pitch_rms")
-COLOURS = 64  # of the picture
 BEGIN, END = "<!-- control:{} -->", "<!-- /control:{} -->"  # of a table's place on a page
 
 
@@ -135,7 +131,7 @@ def put_into(pages: Sequence[Path], tables: Mapping[str, str]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Writes the tables into the pages, and the picture of the course beside them."""
+    """Writes the tables into the pages."""
     folder = Path(*(arguments or sys.argv[1:] or ["out/benchmark"]))
     table, _ = read_table(folder)
     tables = dict(course_tables(table))
@@ -145,9 +141,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     put_into(PAGES, tables)
     demo = compared("demo_course", [*OWN, CHOSEN[0], CHOSEN[-1]])
     put_into((ROOT / "README.md",), {"demo": metrics_table(demo, brief=True)})
-    with Image.open(folder / FOLDER / f"{STEM}.png") as picture:
-        small = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
-    small.save(ROOT / "docs" / "images" / f"{STEM}.png", optimize=True)
     return 0
 
 

@@ -59,7 +59,6 @@ TOLERANCES = (
 )
 EXPLICIT_TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 STEPS = (5e-3, 2.5e-3, 1.25e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
-EXPLICIT_STEPS = (1e-4, 5e-5, 2.5e-5)
 PEER_STEPS = (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)
 OWN_STEPS = (2e-3, 1e-3, 5e-4)
 
@@ -72,18 +71,13 @@ def ours() -> list[Series]:
     ]
     explicit = [
         Series(engine=OURS, method=name, settings=EXPLICIT_TOLERANCES, adaptive=True)
-        for name in ("dp54", "bs32")
+        for name in ("dp54",)
     ]
     fixed = [
         Series(engine=OURS, method=f"{name}-fixed", settings=STEPS, adaptive=False)
         for name in ("rosw3", "ros2")
     ]
-    return [
-        *implicit,
-        *explicit,
-        *fixed,
-        Series(engine=OURS, method="rk4-fixed", settings=EXPLICIT_STEPS, adaptive=False),
-    ]
+    return [*implicit, *explicit, *fixed]
 
 
 def peers() -> list[Series]:

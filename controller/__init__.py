@@ -8,15 +8,15 @@ from hexapod_cosim.controller.controller import (
     ControllerError,
 )
 from hexapod_cosim.controller.gains import (
+    SWITCHES,
     Gains,
     GainsError,
     Margins,
     PaperGains,
+    Parts,
     Requirements,
-    load_gains,
-    save_gains,
 )
-from hexapod_cosim.controller.parts import COMPLIANT_PARTS, SWITCHES, Parts
+from hexapod_cosim.controller.gains_file import load_gains, save_gains
 from hexapod_cosim.controller.signals import DEFAULT_PERIOD, Diagnostics, JointCommand, Measurement
 from hexapod_cosim.controller.walk.command import BodyCommand, CommandRamp
 from hexapod_cosim.controller.walk.foot_paths import FootPaths
@@ -24,7 +24,6 @@ from hexapod_cosim.controller.walk.gait import PATTERNS, Gait, Pattern, make_gai
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 
 __all__ = [
-    "COMPLIANT_PARTS",
     "DEFAULT_PERIOD",
     "PATTERNS",
     "SWITCHES",

@@ -18,12 +18,13 @@ import numpy as np
 from hexapod_cosim.controller.comply.compliant import Compliant, PresentStep, sense
 from hexapod_cosim.controller.comply.paper import Paper, Step
 from hexapod_cosim.controller.comply.posture import LEVEL
-from hexapod_cosim.controller.gains import Gains
+from hexapod_cosim.controller.gains import Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plan import WalkPlan
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, rows_of
+from hexapod_cosim.controller.sense.health import Health
 from hexapod_cosim.controller.signals import Diagnostics, JointCommand, Measurement
+from hexapod_cosim.controller.walk.absence import gait_without
 from hexapod_cosim.controller.walk.command import BodyCommand
 from hexapod_cosim.controller.walk.fade import Fade
 from hexapod_cosim.controller.walk.gait import Gait
@@ -74,7 +75,10 @@ class Controller(Stateful):
     an impossible period.
     """
 
-    STATE = ("plan", "compliant", "paper", "fade", "_start", "_count", "_shown", "_next")
+    STATE = (
+        "plan", "compliant", "paper", "fade", "health", "_start", "_count", "_shown", "_next",
+        "_back",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -91,8 +95,11 @@ class Controller(Stateful):
         self.robot, self.period, self.gains, self.parts = robot, period, gains, parts
         self.legs, self.stance, self.law = LegSolver(robot), robot.stance, law
         self.fade = Fade(period=period)
+        self.health = Health(robot, gains, legs=self.legs, period=period)
+        self._asked = gait  # that was asked for; without a leg, another one is walked
         self._build(gait)
         self._next: Gait | None = None  # that the legs change to
+        self._back: int | None = None  # leg that is taken back into service then
         self.warnings = gains_warnings(robot, gains, period)
         self._out = JointCommand()
         self.diagnostics = Diagnostics()
@@ -125,8 +132,15 @@ class Controller(Stateful):
             self.compliant.present = laws.present
         if self.paper is not None and paper is not None:
             self.paper.restore(paper.save())
-        self.plan.adopt(plan)
-        self._next = None
+        self.plan.adopt(plan, self._back)
+        self._next = self._back = None
+
+    def _change(self, back: int | None = None) -> None:
+        """Begins a change to the gait of the legs in service, with one that comes back (C58)."""
+        absent = self.plan.absence.legs & (np.arange(LEGS) != back)
+        backwards = self.plan.ramp.target.vx < 0.0
+        self._next, self._back = gait_without(self._asked, absent, backwards=backwards), back
+        self.plan.end()
 
     def change_gait(self, gait: Gait) -> None:
         """Changes the gait without a jump of the feet, while the robot walks (C55).
@@ -136,9 +150,26 @@ class Controller(Stateful):
         for the period, and then changes nothing.
         """
         _check_period(self.period, gait)
-        self._next = gait
-        self.plan.end()
+        self._asked = gait
+        self._change()
         self._adopt()
+
+    def _watch(self, measurement: Measurement) -> None:
+        """Takes legs that are lost out of service, before the present step is planned (C57)."""
+        health = self.health
+        health.step(measurement.angle, sense(measurement, LEVEL), self._out)
+        if self.plan.lose(health.lost, self._out):
+            self._change()
+
+    def _fold(self, measurement: Measurement) -> None:
+        """Folds legs out of service away, and takes back one that works again (C58)."""
+        absence = self.plan.absence
+        if not absence.legs.any():
+            return
+        there = absence.fold(measurement.angle, self.health, self._out)
+        self.diagnostics.unreachable[...] &= ~absence.legs
+        if there.any() and self._back is None:
+            self._change(int(np.argmax(there)))
 
     def change_control(self, gains: Gains | None, law: str = "compliant") -> None:
         """Changes the control while the robot walks: arguments as for the constructor.
@@ -151,7 +182,7 @@ class Controller(Stateful):
         _check_law(law)
         self.gains, self.law = gains, law
         self.warnings = gains_warnings(self.robot, gains, self.period)
-        plan = self.plan
+        plan, self.health = self.plan, Health(self.robot, gains, legs=self.legs, period=self.period)
         self._build(self.gait)
         if self._start is None:
             self.reset()
@@ -186,7 +217,7 @@ class Controller(Stateful):
                 planned=shown.planned,
                 height=plan.lift(),
                 rise=feet.rise,
-                swinging=plan.paths.clock.swinging,
+                swinging=plan.paths.clock.swinging | plan.absence.legs,
                 angle=measurement.angle,
                 force=sense(measurement, LEVEL),
             )
@@ -235,7 +266,10 @@ class Controller(Stateful):
 
     def reset(self) -> None:
         """Puts the robot in its stance and clears all memory; the next step is the first."""
-        for part in (self.compliant, self.paper, self.fade, self.plan):
+        self._back = None
+        if self.gait != self._asked:
+            self._build(self._asked)
+        for part in (self.compliant, self.paper, self.fade, self.health, self.plan):
             if part is not None:
                 part.reset()
         self._start, self._count, self._next = None, 0, None
@@ -244,7 +278,8 @@ class Controller(Stateful):
 
     def save(self) -> dict[str, Any]:
         """Returns the state that restore() takes; it includes gait and control."""
-        return super().save() | {"gait": self.gait, "control": (self.gains, self.law)}
+        gaits = {"gait": self.gait, "asked": self._asked}
+        return super().save() | gaits | {"control": (self.gains, self.law)}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restores a state returned by save(); the following steps repeat exactly."""
@@ -252,6 +287,7 @@ class Controller(Stateful):
         if (state["gait"], state["control"]) != (self.gait, control):
             self.gains, self.law = state["control"]
             self._build(state["gait"])
+        self._asked = state["asked"]
         own = {name: value for name, value in state.items() if name in self.STATE}
         super().restore(own)
         self._follow_paths()
@@ -285,10 +321,15 @@ class Controller(Stateful):
                 self._start = t
             else:
                 self._count += 1
+                if self.gains is not None:
+                    self._watch(measurement)
                 self.plan.advance(command_changed)
             self._follow_paths()
             self._apply_laws(measurement)
             self.fade.step(self.legs, self._out)
+            self._fold(measurement)
+            self.diagnostics.absent[...] = self.plan.absence.legs
+            self.diagnostics.faulty[...] = self.health.faulty.T
             self._adopt()
         return self._out
 

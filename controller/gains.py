@@ -1,54 +1,151 @@
-"""Defines the gains of compliant control, their requirements and margins, and their TOML file."""
+"""Defines the parts of the controller and the gains of each: the one table of them.
+
+A part of the controller is a switch of `Parts`; its gains are a section of `Gains`. The variables
+of the controller's FMU, its structures in C and the keys of scenarios and of gains files follow
+from the rows here.
+"""
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import MISSING, dataclass, fields
-from pathlib import Path
+from dataclasses import dataclass, fields
 from typing import Annotated, Any
 
-from hexapod_cosim.models import HexapodError, Robot, RobotError
-from hexapod_cosim.models.errors import refuse_path
-from hexapod_cosim.models.files import read_text
-from hexapod_cosim.models.schema import (
-    Number,
-    Text,
-    decoding_toml,
-    expect_table,
-    parse_toml,
-    read_given,
-    require,
-    specs,
-)
+from hexapod_cosim.models import HexapodError, Robot
+from hexapod_cosim.models.schema import Flag, Number, Text
 
-FORMAT = 5
+Switch = Annotated[bool, Flag()]
 Real = Annotated[float, Number("SI unit")]
 NotNegative = Annotated[float, Number("SI unit", at_least=0.0)]
 Positive = Annotated[float, Number("SI unit", above=0.0)]
 TRIPOD_LEGS = 3  # legs that share the weight in a tripod gait: the unit of load is weight / 3
+LEAST = 1e-9  # SI unit    smallest value of a parameter that must be positive
+# nominal and largest values of the parameters of the FMU, by unit
+USUAL = {
+    **{"1": (0.1, 10.0), "m": (0.01, 10.0), "rad": (0.01, 10.0), "s": (0.01, 1e6)},
+    **{"m/s": (0.01, 1e6), "rad/s": (0.01, 1e6), "1/s": (1.0, 1e6)},
+    **{"N.m": (1.0, 1e8), "N.s/m": (10.0, 1e9)},
+}
 
 
 class GainsError(HexapodError):
     """Gains cannot be designed, read or used."""
 
 
+@dataclass(frozen=True)
+class Row:
+    """What the FMU says of its parameter for a switch or a number.
+
+    unit: "" for a switch; nominal, low, most: by default those of the unit; low: 0, or LEAST of a
+    positive number.
+    """
+
+    text: str
+    unit: str = ""
+    nominal: float | None = None
+    low: float | None = None
+    most: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parts:
+    """Switches of the parts of both force controls, and the weight of the squeeze.
+
+    Each part can be switched by itself, so that its effect can be measured. Switches have no effect
+    on kinematic control.
+    """
+
+    support: Annotated[
+        Switch, Row("servo torques that carry each leg's share of weight and acceleration")
+    ] = True
+    paper_share: Annotated[Switch, Row("a share of the deviations of the feet is taken back")] = (
+        True
+    )
+    paper_pid: Annotated[
+        Switch,
+        Row("feet yield to the forces that make them slip, and return to their planned places"),
+    ] = True
+    paper_suspension: Annotated[
+        Switch,
+        Row("a foot yields where it meets the ground early and extends where it meets it late"),
+    ] = True
+    touchdown: Annotated[Switch, Row("early and late touch-downs are answered")] = True
+    posture: Annotated[Switch, Row("roll, pitch and height are held")] = True
+    sway: Annotated[Switch, Row("under a payload the torso moves against the swinging legs")] = True
+    path: Annotated[
+        Switch, Row("the walked way is measured at the feet and held to the command")
+    ] = True
+    limits: Annotated[Switch, Row("torques are limited")] = True
+    fallback: Annotated[
+        Switch,
+        Row(
+            "no feedback from a sensor that contradicts the plan; kinematic control while the "
+            "robot slides or outruns its joints"
+        ),
+    ] = True
+    squeeze: Annotated[
+        float,
+        Number("1", at_least=0.0, at_most=0.99),
+        Row(
+            "Weight of the servos' torques against the feet's use of friction in the planned "
+            "squeeze of the legs; 0 plans none",
+            "1",
+            low=0.0,
+            most=0.99,
+        ),
+    ] = 0.3
+
+
+SWITCHES = tuple(item.name for item in fields(Parts) if item.name != "squeeze")
+
+
 @dataclass(frozen=True, kw_only=True)
 class PaperGains:
     """Corrections of the feet by the paper's control (C25, C26, C47 to C49)."""
 
-    share: NotNegative  # 1    of the deviation along the ground that is taken back, at duty 1/2
-    height_share: NotNegative  # 1    the same of the deviation upwards
-    share_limit: NotNegative  # 1    largest share at any duty
-    yield_share: NotNegative  # 1    P part: yield to a force over the softness of the leg
-    return_rate: NotNegative  # 1/s    I part: return of all feet
-    filter_time: Positive  # s    smoothing of the measured forces
-    damping: Positive  # N s/m    of the suspension
-    return_time: Positive  # s    of the suspension of a standing foot
-    sag_limit: NotNegative  # m    largest lift of a foot in the air by the torso's sag
-    limit: Positive  # m    largest deflection of the suspension and return of the feet
+    share: Annotated[
+        NotNegative,
+        Row(
+            "Share of a foot's deviation along the ground under its load that the paper's control"
+            " takes back, at duty 1/2",
+            "1",
+        ),
+    ]
+    height_share: Annotated[
+        NotNegative,
+        Row("Share of the deviation upwards that the paper's control takes back, at duty 1/2", "1"),
+    ]
+    share_limit: Annotated[NotNegative, Row("Largest share at any duty", "1")]
+    yield_share: Annotated[
+        NotNegative,
+        Row(
+            "Yield of the paper's control to the force that makes a foot slip, over the softness "
+            "of the leg",
+            "1",
+            low=-10.0,
+        ),
+    ]
+    return_rate: Annotated[
+        NotNegative,
+        Row(
+            "Rate at which the paper's control returns the standing feet to their planned places",
+            "1/s",
+        ),
+    ]
+    filter_time: Annotated[Positive, Row("Smoothing of the forces of the paper's control", "s")]
+    damping: Annotated[
+        Positive, Row("Damping of the suspension of the paper's control, per foot", "N.s/m")
+    ]
+    return_time: Annotated[
+        Positive, Row("Time in which the suspension of a standing foot returns", "s", nominal=1.0)
+    ]
+    sag_limit: Annotated[
+        NotNegative, Row("Largest lift of a foot in the air by the torso's sag", "m")
+    ]
+    limit: Annotated[
+        Positive,
+        Row("Largest deflection of the suspension and return of the feet, paper's control", "m"),
+    ]
 
     def shares(self, duty: float) -> tuple[float, float]:
         """Returns the shares along the ground and upwards of a gait with this duty factor [1].
@@ -66,30 +163,43 @@ class PaperGains:
 class SupportGains:
     """Feed-forward of the planned load."""
 
-    handover_time: Positive  # s    duration of the change of load between two sets of legs
-    weight_time: Positive  # s    smoothing of the measured weight that the plan is scaled by
-    load_time: Positive  # s    smoothing of the measured loads, grip and trust
+    handover_time: Annotated[
+        Positive, Row("Time in which one set of legs hands the weight to the next", "s")
+    ]
+    weight_time: Annotated[
+        Positive,
+        Row("Smoothing of the measured weight that the plan is scaled by", "s", nominal=0.1),
+    ]
+    load_time: Annotated[
+        Positive, Row("Smoothing of the measured loads, of the grip and of the trust", "s")
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
 class HoldGains:
     """Slow loops: torso attitude and height over the ground, and the path walked."""
 
-    attitude_rate: NotNegative  # 1/s    integral of roll and pitch
-    height_rate: NotNegative  # 1/s    integral of the height
-    ground_time: Positive  # s    smoothing of the ground's measured inclination
-    angle_limit: NotNegative  # rad    largest correction of roll and pitch
-    height_limit: NotNegative  # m    largest correction of the height
-    path_rate: NotNegative  # 1/s    gain from deviations of the path to the added velocity
-    speed_limit: NotNegative  # m/s    largest added velocity
-    turn_limit: NotNegative  # rad/s    largest added yaw rate
+    attitude_rate: Annotated[NotNegative, Row("Integral of roll and pitch", "1/s")]
+    height_rate: Annotated[NotNegative, Row("Integral of the height", "1/s")]
+    ground_time: Annotated[
+        Positive, Row("Smoothing of the ground's measured inclination", "s", nominal=1.0)
+    ]
+    angle_limit: Annotated[NotNegative, Row("Largest correction of roll and pitch", "rad")]
+    height_limit: Annotated[NotNegative, Row("Largest correction of the height", "m")]
+    path_rate: Annotated[
+        NotNegative, Row("From way and heading lost to a change of the commanded velocity", "1/s")
+    ]
+    speed_limit: Annotated[
+        NotNegative, Row("Largest change of the commanded velocity", "m/s", low=1e-09)
+    ]
+    turn_limit: Annotated[NotNegative, Row("Largest change of the commanded yaw rate", "rad/s")]
 
 
 @dataclass(frozen=True, kw_only=True)
 class LimitGains:
     """Limits of what compliant control adds to the commands."""
 
-    torque: Positive  # N m    largest feed-forward torque
+    torque: Annotated[Positive, Row("Largest feed-forward torque", "N.m")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,7 +269,7 @@ class Gains:
     def as_facts(self) -> dict[str, Any]:
         """Returns the gains as nested dictionaries, as dataclasses.asdict() does in more time."""
         return {
-            name: dict(vars(value)) if name in PARTS else value
+            name: dict(vars(value)) if name in SECTIONS else value
             for name, value in vars(self).items()
         }
 
@@ -176,7 +286,7 @@ class Gains:
         return None
 
 
-PARTS: dict[str, type[Any]] = {
+SECTIONS: dict[str, type[Any]] = {
     "requirements": Requirements,
     "support": SupportGains,
     "hold": HoldGains,
@@ -184,101 +294,3 @@ PARTS: dict[str, type[Any]] = {
     "paper": PaperGains,
     "margins": Margins,
 }
-
-
-@contextmanager
-def raising_gains_errors() -> Iterator[None]:
-    """Turns the errors of checked records into GainsError."""
-    try:
-        yield
-    except RobotError as error:
-        raise GainsError(
-            error.what,
-            got=error.got,
-            expected=error.expected,
-            fix=error.fix,
-            where=error.where,
-        ) from error
-
-
-def save_gains(gains: Gains, path: str | Path) -> Path:
-    """Writes a gains file (TOML, floats to the last bit).
-
-    Raises GainsError when the file cannot be written.
-    """
-    lines = ["# Gains of compliant and paper control, SI units; made by `hexapod design`."]
-    lines += [f"format = {FORMAT}", *_toml_lines(gains), f"caveats = {json.dumps(gains.caveats)}"]
-    for part in PARTS:
-        lines += ["", f"[{part}]", *_toml_lines(getattr(gains, part))]
-    target = Path(path)
-    partial = target.with_name(target.name + ".partial")
-    try:
-        partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        partial.replace(target)
-    except OSError as error:
-        raise GainsError(
-            "cannot write the gains file",
-            got=error.strerror,
-            fix="choose a writable folder",
-            where=str(target),
-        ) from error
-    return target
-
-
-def _toml_lines(record: Any) -> list[str]:
-    """Returns a line for each number and text of a record; a margin without a limit has none."""
-    values = {key: getattr(record, key) for key in specs(type(record))}
-    return [
-        f"{key} = {json.dumps(value) if isinstance(value, str) else repr(value)}"
-        for key, value in values.items()
-        if value != math.inf
-    ]
-
-
-def load_gains(path: str | Path) -> Gains:
-    """Reads and checks a gains file.
-
-    Raises GainsError: the file, the key, what was got and expected.
-    """
-    refuse_path(path, "the gains file", GainsError)
-    try:
-        with decoding_toml(Path(path), kind="gains", error=GainsError):
-            table = parse_toml(read_text(Path(path)))
-    except OSError as error:
-        raise GainsError(
-            "cannot read the gains file",
-            got=error.strerror,
-            fix="make one with `hexapod design`",
-            where=str(path),
-        ) from error
-    if table.pop("format", None) != FORMAT:
-        raise GainsError(
-            "unknown format of gains",
-            expected=f"format = {FORMAT}",
-            fix="make the file again with `hexapod design`",
-            where=str(path),
-        )
-    with raising_gains_errors():
-        return _read(table, str(path))
-
-
-def _read(table: dict[str, Any], where: str) -> Gains:
-    """Returns the gains of a file's tables. Raises RobotError; `where` names the file."""
-    parts = {
-        name: _read_record(kind, table.pop(name, None), f"{where}: [{name}]")
-        for name, kind in PARTS.items()
-    }
-    caveats = table.pop("caveats", [])
-    texts = caveats if isinstance(caveats, list) else [caveats]
-    known = tuple(Text().read(text, f"{where}: caveats") for text in texts)
-    head = require(Gains, read_given(Gains, table, where), where)
-    return Gains(**head, **parts, caveats=known)
-
-
-def _read_record(kind: type[Any], value: Any, where: str) -> Any:
-    """Returns a record of a table; a margin without a limit may be absent, or infinite."""
-    table = expect_table(value, where)
-    given = {key: value for key, value in table.items() if value != math.inf}
-    values = read_given(kind, given, where)
-    usual = {item.name: item.default for item in fields(kind) if item.default is not MISSING}
-    return kind(**require(kind, usual | values, where))

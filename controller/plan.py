@@ -16,10 +16,12 @@ import numpy as np
 
 from hexapod_cosim.controller.comply.compliant import Compliant
 from hexapod_cosim.controller.comply.posture import Posture
+from hexapod_cosim.controller.gains import Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.parts import Parts
-from hexapod_cosim.controller.plane import LEGS, Array, cis, rows_of
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, cis, rows_of
 from hexapod_cosim.controller.planned_step import PlannedStep, StepPlanner
+from hexapod_cosim.controller.signals import JointCommand
+from hexapod_cosim.controller.walk.absence import Absence
 from hexapod_cosim.controller.walk.command import CommandRamp
 from hexapod_cosim.controller.walk.foot_paths import FootPaths
 from hexapod_cosim.controller.walk.gait import Gait
@@ -43,7 +45,7 @@ class WalkPlan(Stateful):
         laws: compliant control, on which the plan depends; None: none.
     """
 
-    STATE = ("ramp", "paths", "at", "last", "cut", "before", "now", "after")
+    STATE = ("ramp", "paths", "at", "last", "cut", "before", "now", "after", "absence")
 
     def __init__(
         self, gait: Gait, parts: Parts, *, legs: LegSolver, period: float, laws: Compliant | None
@@ -58,6 +60,8 @@ class WalkPlan(Stateful):
         self.paths = FootPaths(gait, home, period=period, inward=inward, turned=turned)
         if laws is not None:
             self.paths.clock.handover = laws.support.handover
+        handover = 0.0 if laws is None else laws.support.handover * gait.period
+        self.absence = Absence(legs, self.paths.home, handover=handover, period=period)
         self.planner = StepPlanner(parts, legs=legs, laws=laws)
         self.now: PlannedStep
         self.reset()
@@ -68,9 +72,11 @@ class WalkPlan(Stateful):
         self.at, self.last, self.cut = 0, math.inf, True
         self.before: PlannedStep | None = None
         self.after: PlannedStep | None = None
+        self.absence.reset()
+        self.paths.clock.absent = NO_LEG
         feet = self.paths.reset()
         value, posture, _ = self._look_ahead(0, 0)
-        self.now = self.planner.lay_out(value, posture, feet, self.paths.clock)
+        self.now = self.planner.lay_out(value, posture, feet, self.paths.clock, self.absence, 0)
 
     # ---------------------------------------------------------------------------------- a step
 
@@ -80,6 +86,9 @@ class WalkPlan(Stateful):
         number: periods since the section began, on which the addition of the slow loops depends.
         """
         value, rate = self.ramp.ahead(ahead)
+        drift = self.absence.drift(ahead)
+        if drift != 0j:
+            value = value + np.array([drift.real, drift.imag, 0.0, 0.0, 0.0, 0.0])
         vx, vy, yaw_rate = value[:3].tolist()
         twist = Twist(complex(vx, vy), yaw_rate)
         if self.laws is not None:
@@ -91,7 +100,7 @@ class WalkPlan(Stateful):
         """Plans the step `number` periods after the section began; before: the step before it."""
         value, posture, twist = self._look_ahead(1, number)
         feet = self.paths.walk(number, twist, before.feet)
-        return self.planner.lay_out(value, posture, feet, self.paths.clock)
+        return self.planner.lay_out(value, posture, feet, self.paths.clock, self.absence, 1)
 
     # --------------------------------------------------------------------------------- sections
 
@@ -106,11 +115,13 @@ class WalkPlan(Stateful):
             paths.narrowing = laws.adaptation.narrowing
 
     def _waits(self) -> bool:
-        """Returns whether the gait clock waits for feet at the ends of their swings (C50)."""
+        """Returns whether the gait clock waits for feet at the ends of their swings (C50).
+
+        Without a leg, a foot may have no load to carry: it need only touch the ground.
+        """
         clock = self.paths.clock
-        return self.laws is not None and self.laws.laws.waits(
-            clock.landing(self.at), held=clock.held
-        )
+        held = clock.held and not clock.absent.any()
+        return self.laws is not None and self.laws.laws.waits(clock.landing(self.at), held=held)
 
     def _plan_afresh(self, *, waiting: bool) -> None:
         """Begins a new section at the present step, and plans the step after it.
@@ -126,7 +137,7 @@ class WalkPlan(Stateful):
             feet = self.paths.hold(self.now.feet, self.at, twist=twist)
         else:
             feet = self.paths.plan(self.now.feet, self.at, going=going, twist=twist)
-        self.now = self.planner.lay_out(value, posture, feet, self.paths.clock)
+        self.now = self.planner.lay_out(value, posture, feet, self.paths.clock, self.absence, 0)
         self.last = math.inf if moves or settled else self.ramp.end - self.ramp.steps
         self.at = 0
         self.after = self._plan_step(1, self.now)
@@ -147,8 +158,10 @@ class WalkPlan(Stateful):
         self.before, self.now, self.after = self.now, self.after, None
         self.at += 1
         self.ramp.steps += 1
+        self.absence.since += 1
         number = self.at + 1
         reached, planned = clock.reach(number), number <= self.last
+        reached = reached and not self.paths.down(self.now.feet).any()
         self.cut = planned and not reached
         if reached and planned:
             self.after = self._plan_step(number, self.now)
@@ -163,17 +176,32 @@ class WalkPlan(Stateful):
     def ended(self) -> bool:
         """Returns whether all legs stand and carry their whole loads."""
         clock = self.paths.clock
-        full = bool((self.now.activation >= 1.0).all())
+        full = bool(((self.now.activation >= 1.0) | clock.absent).all())
         return not clock.walking or (clock.ended() and full)
 
-    def adopt(self, before: WalkPlan) -> None:
-        """Begins with the standing feet and the command of the plan of another gait (C55)."""
+    def lose(self, lost: Mask, out: JointCommand) -> bool:
+        """Takes lost legs (6,) out of service (C58). Returns whether any is new."""
+        if not self.absence.change(lost, out):
+            return False
+        self.paths.clock.absent = self.absence.legs
+        self.end()
+        self.paths.clock.drop()
+        return True
+
+    def adopt(self, before: WalkPlan, back: int | None = None) -> None:
+        """Begins with the standing feet and the command of the plan of another gait (C55).
+
+        back: a leg that is back in service (C58).
+        """
         clock = self.paths.clock
         offset, late = clock.offset, clock.late
         self.restore(before.save())
         self.ramp.carry(before.ramp)
         clock.offset, clock.late = offset, late
-        self.now = self.now._replace(feet=self.paths.join(self.now.feet))
+        if back is not None:
+            self.absence.take_back(back)
+            clock.absent = self.absence.legs
+        self.now = self.now._replace(feet=self.paths.join(self.now.feet, self.absence.torso, back))
         self.after, self.at, self.last, self.cut = None, 0, math.inf, True
 
     def carry(self, before: WalkPlan) -> None:
@@ -218,7 +246,8 @@ class WalkPlan(Stateful):
 
     def lift(self) -> Array:
         """Returns the heights of the paths of the feet (6,) over the stance [m]."""
-        return np.asarray(self.now.feet.height - self.paths.home_height)
+        height = self.now.feet.height - self.paths.home_height
+        return np.where(self.paths.clock.absent, 0.0, height)
 
     def neighbour(self) -> tuple[Pose | None, float]:
         """Returns the pose after (else before) the present one, and its time from there [s]."""

@@ -12,8 +12,9 @@ import numpy as np
 from hexapod_cosim.controller.comply.compliant import Compliant
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.comply.sway import Sway
-from hexapod_cosim.controller.parts import Parts
+from hexapod_cosim.controller.gains import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis
+from hexapod_cosim.controller.walk.absence import Absence
 from hexapod_cosim.controller.walk.foot_paths import PlannedFeet
 from hexapod_cosim.controller.walk.gait_clock import GaitClock
 from hexapod_cosim.controller.walk.inverse_dynamics import Masses
@@ -67,16 +68,22 @@ class StepPlanner:
         self.sway = None if laws is None else Sway(laws.dynamics, legs, active=parts.sway)
 
     def _stand(
-        self, value: Array, posture: Posture, feet: PlannedFeet, torso: complex, clock: GaitClock
+        self,
+        value: Array,
+        posture: Posture,
+        feet: PlannedFeet,
+        torso: complex,
+        clock: GaitClock,
+        presence: Array,
     ) -> PlannedStep:
         """Computes the pose of the legs and the point masses for a torso that has moved.
 
-        torso: its way in the walking frame [m].
+        torso: its way in the walking frame [m]; presence: (6,) factors on the activations [1].
         """
         plane = feet.plane - torso
-        activation, lowering, masses = np.ones(LEGS), np.zeros(LEGS), None
+        activation, lowering, masses = presence, np.zeros(LEGS), None
         if self.laws is not None:
-            activation, lowering = self.laws.lowered(feet.phase, plane, clock)
+            activation, lowering = self.laws.lowered(feet.phase, plane, clock, presence)
         height = feet.height - lowering
         shift, pose = place_legs(self.legs, posture, plane, height, feet.rolled)
         if self.laws is not None:
@@ -97,20 +104,27 @@ class StepPlanner:
         )
 
     def lay_out(
-        self, value: Array, posture: Posture, feet: PlannedFeet, clock: GaitClock
+        self,
+        value: Array,
+        posture: Posture,
+        feet: PlannedFeet,
+        clock: GaitClock,
+        absence: Absence,
+        ahead: int,
     ) -> PlannedStep:
         """Computes way of the torso, pose of the legs and point masses for planned feet.
 
-        clock: of the gait, in the section of the step.
+        clock: of the gait, in the section of the step; ahead: periods from the present step.
         """
-        torso, sway, laws = 0j, self.sway, self.laws
+        torso, presence = absence.torso(ahead), absence.presence(ahead)
+        sway, laws = self.sway, self.laws
         if laws is not None and sway is not None and sway.acts(laws.adaptation.narrowing):
             guess = sway.guess(feet, laws.adaptation.laden())
-            masses = self._stand(value, posture, feet, guess, clock).masses
+            masses = self._stand(value, posture, feet, guess, clock, presence).masses
             assert masses is not None
             part, laden = laws.adaptation.narrowing, laws.adaptation.laden()
-            torso = part * sway.of(guess, masses, laden)
-        return self._stand(value, posture, feet, torso, clock)
+            torso += part * sway.of(guess, masses, laden)
+        return self._stand(value, posture, feet, torso, clock, presence)
 
     def laden(self) -> float:
         """Returns the weight that moves with the torso over the modelled one [1] (C53)."""

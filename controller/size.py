@@ -10,22 +10,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_type_hints
 
 import numpy as np
 
-from hexapod_cosim.controller.gains import LimitGains, PaperGains, Requirements
+from hexapod_cosim.controller.gains import SECTIONS, LimitGains, PaperGains, Requirements, Row
 from hexapod_cosim.controller.plane import LEGS
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.schema import specs
 
+FIXED = ("filter_time",)  # of the sensors, whatever the size of the robot
 SHORTEST, LONGEST = 0.22, 0.44  # m    coxa, femur and tibia of legs that the figures suit
-LENGTHS = ("sag_limit", "deflection_limit", "height_limit")
-TIMES = ("load_time", "handover_time", "weight_time", "ground_time", "return_time")
-RATES = ("return_rate", "attitude_rate", "height_rate", "path_rate", "turn_limit")
-SPEEDS = ("landing_speed", "speed_limit")
-
 _Section = TypeVar("_Section")
 
 
@@ -53,16 +49,27 @@ def size_of(robot: Robot) -> Size:
     return Size(length / min(max(length, SHORTEST), LONGEST))
 
 
+def _units() -> dict[str, str]:
+    """Returns the units of the requirements that are scaled, by name: those of the gains."""
+    own = {"deflection_limit": "m", "landing_speed": "m/s"}
+    for kind in SECTIONS.values():
+        for name, hint in get_type_hints(kind, include_extras=True).items():
+            for fact in getattr(hint, "__metadata__", ()):
+                if isinstance(fact, Row):
+                    own[name] = fact.unit
+    return {name: own[name] for name in specs(Requirements) if name in own and name not in FIXED}
+
+
 def requirements_for(robot: Robot, **given: Any) -> Requirements:
     """Returns the requirements for a robot's size; given values are used unchanged."""
     size, usual = size_of(robot), Requirements()
-    factors = (
-        (LENGTHS, size.length),
-        (TIMES, size.time),
-        (RATES, 1.0 / size.time),
-        (SPEEDS, size.speed),
-    )
-    asked = {name: getattr(usual, name) * factor for names, factor in factors for name in names}
+    rate = 1.0 / size.time
+    factors = {"m": size.length, "s": size.time, "1/s": rate, "rad/s": rate, "m/s": size.speed}
+    asked = {
+        name: getattr(usual, name) * factors[unit]
+        for name, unit in _units().items()
+        if unit in factors
+    }
     return Requirements(**{**asked, **given})
 
 
@@ -81,3 +88,14 @@ def paper_gains(robot: Robot, needs: Requirements) -> PaperGains:
 def limit_gains(robot: Robot, needs: Requirements) -> LimitGains:
     """Returns the limit of commanded torques [N m]."""
     return LimitGains(torque=needs.torque_share * robot.servo.torque_max)
+
+
+def sections_for(robot: Robot, needs: Requirements) -> dict[str, Any]:
+    """Returns the sections of the gains before the design limits the paper's shares, by name."""
+    asked = specs(Requirements).keys()
+    plain = {name: kind for name, kind in SECTIONS.items() if specs(kind).keys() < asked}
+    return {
+        **{name: taken(kind, needs) for name, kind in plain.items()},
+        "limits": limit_gains(robot, needs),
+        "paper": paper_gains(robot, needs),
+    }

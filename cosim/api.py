@@ -78,9 +78,8 @@ def simulate(
     Warns:
         RuntimeWarning: the run ended early, with the reason: its metrics are NaN.
     """
-    text = controller if isinstance(controller, str) else None
-    if isinstance(controller, Control):
-        text = controller.text
+    text = controller.text if isinstance(controller, Control) else controller
+    text = text if isinstance(text, str) else None
     law = None if text is not None else controller
     plan = _scenario(scenario, settings or {}, text)
     if label is not None and law is None:
@@ -88,17 +87,12 @@ def simulate(
         plan = replace(plan, control=parse_control(f"{label}={plain}", where="label").text)
     if law is None:
         check_control(plan, [control_of(plan.control)])
-    result = run_scenario(
-        plan,
-        fmu=None if fmu is None else Path(fmu),
-        gains=load_gains(gains) if isinstance(gains, str | Path) else gains,
-        progress=progress,
-        law=law,
-        label=label,
-    )
+    place = None if fmu is None else Path(fmu)
+    loaded = load_gains(gains) if isinstance(gains, str | Path) else gains
+    result = run_scenario(plan, fmu=place, gains=loaded, progress=progress, law=law, label=label)
     if result.outcome.status == FAILED:
-        text = f"the run ended early, without metrics: {result.outcome.reason}"
-        warn(text, RuntimeWarning, stacklevel=2)
+        reason = f"the run ended early, without metrics: {result.outcome.reason}"
+        warn(reason, RuntimeWarning, stacklevel=2)
     return result
 
 

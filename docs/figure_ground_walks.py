@@ -1,7 +1,7 @@
 """Makes the pictures of walks on uneven ground for docs/ground.md.
 
-hexapod compare stairs rubble stones sand dune ramp course --control kinematic \
-    --control kinematic@chosen --control compliant@chosen -o out/terrains
+for ground in stairs rubble stones sand dune ramp course; do hexapod compare $ground --control \
+    kinematic --control kinematic@chosen --control compliant@chosen -o out/terrains/$ground; done
 python docs/figure_ground_walks.py out/terrains
 
 Writes docs/images/ground_walks.png, the figure of the comparison, and
@@ -17,6 +17,7 @@ import shutil
 import sys
 from pathlib import Path
 
+import ground_figure
 from PIL import Image
 from playwright.sync_api import Browser, sync_playwright
 
@@ -39,7 +40,9 @@ NAMED = "(labels, name) => labels.forEach(label => label.prepend(`${name}, `))"
 def main() -> None:
     """Writes the pictures."""
     folder = Path(sys.argv[1]).resolve()
-    reduced(Image.open(folder / "terrains.png")).save(IMAGES / "ground_walks.png", optimize=True)
+    drawn = folder / "ground_walks.png"
+    ground_figure.draw(folder, SHOWN, drawn)
+    reduced(Image.open(drawn)).save(IMAGES / drawn.name, optimize=True)
     chromium = os.environ.get("HEXAPOD_CHROMIUM") or shutil.which("chromium")
     if chromium is None:
         sys.exit("no Chromium: apt-get install chromium, or HEXAPOD_CHROMIUM=/path/to/it")

@@ -81,6 +81,10 @@ typedef struct hxContinuous {
   hxStatus (*step)(hxComponent *component, const struct hxVariables *variables, double t_end,
                    int stop, int *event);
 
+  /* Changes the component's tunable parameters to those in the variables; sets the states in the
+   * variables, which may change with it. On failure only the message changes. */
+  hxStatus (*tune)(hxComponent *component, struct hxVariables *variables);
+
   /* Calculates the event indicators. */
   void (*indicate)(const hxComponent *component, double indicator[]);
 

@@ -101,7 +101,10 @@ hxStatus hx_instance_get_indicators(hxInstance *instance, double indicator[], si
 }
 
 hxStatus hx_instance_update(hxInstance *instance, int *states_changed) {
-  *states_changed = hx_continuous->update(instance->component, &instance->state.variables);
+  const int tuned = instance->state.tuned;
+  const hxStatus status = hx_instance_tune(instance);
+  if (status != HX_OK) return status;
+  *states_changed = hx_continuous->update(instance->component, &instance->state.variables) || tuned;
   hx_mark_stale(instance);
   return HX_OK;
 }

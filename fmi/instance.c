@@ -97,10 +97,28 @@ static void refresh_output(hxInstance *instance, unsigned groups) {
   state->output_stale = 0;
 }
 
+hxStatus hx_instance_tune(hxInstance *instance) {
+  hxInstanceState *state = &instance->state;
+  if (!state->tuned) return HX_OK;
+  const hxStatus status = hx_continuous->tune(instance->component, &state->variables);
+  if (status != HX_OK) {
+    hx_log(instance, HX_LOG_ERROR, "%s; the parameters are not in force, correct them",
+           hx_component_message(instance->component));
+    return status;
+  }
+  state->tuned = 0;
+  hx_mark_stale(instance);
+  return HX_OK;
+}
+
 hxStatus hx_instance_refresh(hxInstance *instance, unsigned groups, int rate) {
   hxInstanceState *state = &instance->state;
   if (state->model_stale) {
     const hxStatus status = hx_instance_initialize(instance);
+    if (status != HX_OK) return status;
+  }
+  if (state->tuned && state->interface == HX_CO_SIMULATION) {
+    const hxStatus status = hx_instance_tune(instance);
     if (status != HX_OK) return status;
   }
   if (groups) refresh_output(instance, groups);
@@ -342,7 +360,9 @@ hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned refer
   }
   if (type == HX_REAL && n <= HX_KNOWN_INPUTS && causalities == 1u << HX_INPUT)
     keep_inputs(instance, reference, n);
-  instance->state.model_stale |= (causalities & 1u << HX_PARAMETER) && !is_between_steps(instance);
+  const int parameters = (causalities & 1u << HX_PARAMETER) != 0;
+  instance->state.model_stale |= parameters && !is_between_steps(instance);
+  instance->state.tuned |= parameters && is_between_steps(instance) && hx_continuous;
   hx_mark_stale(instance);
   return HX_OK;
 }

@@ -58,6 +58,7 @@ typedef struct hxInstanceState {
   int output_stale;   /* nothing of variables.output is of the present time and input */
   int rate_stale;     /* the rates of the states are not those of the present time and input */
   int interface;      /* hxInterface */
+  int tuned;          /* tunable parameters were set that are not in force yet */
   int ramped;         /* 1: input_rate belongs to the next step; 0: to the last one */
   double start_time;  /* s */
   double stop_time;   /* s  no step passes it; infinite when the importer gives none */
@@ -162,8 +163,11 @@ hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned refer
 hxStatus hx_instance_check_set(hxInstance *instance, hxType type, const unsigned reference[],
                                size_t n, const void *value);
 
+/* Puts tunable parameters in force that were set. */
+hxStatus hx_instance_tune(hxInstance *instance);
+
 /* Updates groups of outputs or the rates to the present time and input, after initializing a
- * component whose parameters were set. */
+ * component whose parameters were set, or, in co-simulation, putting them in force. */
 hxStatus hx_instance_refresh(hxInstance *instance, unsigned groups, int rate);
 
 /* Returns HX_NOT_FINITE, so that a solver tries a smaller step, unless all numbers are finite. */

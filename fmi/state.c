@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STATE_FORMAT = 3 };
+enum { STATE_FORMAT = 4 };
 
 static const char state_magic[8] = "hexapod";
 
@@ -144,7 +144,7 @@ static int is_instance_state(const hxInstanceState *state) {
   const int mode = state->mode;
   return mode > 0 && (mode & ~modes) == 0 && (mode & (mode - 1)) == 0 &&
          is_flag(state->model_stale) && is_flag(state->output_stale) &&
-         is_flag(state->rate_stale) && is_flag(state->ramped) &&
+         is_flag(state->rate_stale) && is_flag(state->ramped) && is_flag(state->tuned) &&
          fabs(state->start_time) <= hx_latest_start && !isnan(state->stop_time) &&
          are_in_range(&state->variables, HX_INPUT) && are_in_range(&state->variables, HX_PARAMETER);
 }

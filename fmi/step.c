@@ -142,6 +142,7 @@ hxStatus hx_instance_step(hxInstance *instance, double t, double h) {
   const hxInput *rate = instance->state.ramped ? &instance->state.input_rate : NULL;
   hxInput end;
   hxStatus status = check_step(instance, t, h);
+  if (status == HX_OK) status = hx_instance_tune(instance);
   if (status != HX_OK || t + h <= hx_instance_time(instance)) return status;
   status = ramp_end(instance, h, &end);
   if (status != HX_OK) return status;
@@ -154,7 +155,8 @@ hxStatus hx_instance_step_to_event(hxInstance *instance, double t, double h, int
   const struct hxVariables *variables = &instance->state.variables;
   *event = 0;
   if (!hx_continuous || instance->state.ramped) return hx_instance_step(instance, t, h);
-  const hxStatus status = check_step(instance, t, h);
+  hxStatus status = check_step(instance, t, h);
+  if (status == HX_OK) status = hx_instance_tune(instance);
   if (status != HX_OK || t + h <= hx_instance_time(instance)) return status;
   return finish_step(instance, t, h, &variables->input,
                      hx_continuous->step(instance->component, variables, t + h, stop, event));

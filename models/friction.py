@@ -18,6 +18,7 @@ from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.schema import Choice, Number
 
 SPRING_LIMIT = 0.7  # 1  of the presliding; bristles below it are springs (eq. 16)
+TANH_LIMIT = 0.999  # 1    of the largest force, where the tanh law is inverted
 NO_FRICTION = 1e-30  # 1  keeps ratios of coefficients finite at mu = 0
 
 
@@ -42,6 +43,21 @@ class Friction:
     spin_radius: Annotated[float, Number("m", at_least=0.0, at_most=10.0)] = 0.0
     rolling_radius: Annotated[float, Number("m", at_least=0.0, at_most=10.0)] = 0.0
 
+    @property
+    def has_friction(self) -> bool:
+        """Whether the law has forces along the ground."""
+        return LAWS[self.law].has_friction
+
+    @property
+    def has_bristles(self) -> bool:
+        """Whether a foot can hold under the law: it stands on bristles."""
+        return LAWS[self.law].has_bristles
+
+    @property
+    def creeps(self) -> bool:
+        """Whether a foot creeps under any force along the ground."""
+        return LAWS[self.law].creeps
+
 
 @dataclass(frozen=True)
 class Grip:
@@ -56,13 +72,8 @@ class Grip:
 # laws without bristles
 
 
-def no_friction(friction: Friction, normal: float, slip: Array, bristle: Array) -> Grip:
-    """Returns no force."""
-    return Grip(np.zeros(3), 0.0)
-
-
-def tanh_friction(friction: Friction, normal: float, slip: Array, bristle: Array) -> Grip:
-    """Returns f_t = -f_n (mu(v) tanh(k_t v) + viscous v) v_t/v, v = |v_t| (eq. 15, 35)."""
+def sliding_grip(friction: Friction, normal: float, slip: Array, bristle: Array) -> Grip:
+    """Returns f_t = -f_n (mu(v) g(v) + viscous) v_t, v = |v_t|, with g of the law (eq. 15, 35)."""
     drag = friction_drag(friction, float(np.linalg.norm(slip)))
     return Grip(-normal * drag * slip, drag)
 
@@ -81,20 +92,31 @@ def sliding_friction(friction: Friction, sliding: float) -> float:
     return float(stribeck_curve(friction, np.array(sliding)))
 
 
+def no_friction(friction: Friction, speed: float) -> float:
+    """Returns g = 0."""
+    return 0.0
+
+
 def regularised_direction(friction: Friction, speed: float) -> float:
-    """Returns tanh(k_t v)/v [s/m] at a speed [m/s], at rest k_t."""
+    """Returns g = tanh(k_t v)/v [s/m] at a speed [m/s], at rest k_t (eq. 15)."""
     x = friction.slope * speed
     return math.tanh(x) / speed if x > 1e-5 else friction.slope * (1.0 - x * x / 3.0)
 
 
-def friction_drag(friction: Friction, speed: float) -> float:
-    """Returns the tanh law's force over load and slip speed [s/m] at a slip speed [m/s].
+def tanh_creep(friction: Friction, share: Array) -> Array:
+    """Returns the slip speed [m/s] at which the tanh law has these shares of mu f_n (eq. 15)."""
+    return np.asarray(np.arctanh(np.minimum(share, TANH_LIMIT)) / friction.slope)
 
-    It is mu(v) tanh(k_t v)/v + viscous (eq. 15, 35).
+
+def friction_drag(friction: Friction, speed: float) -> float:
+    """Returns the force over load and slip speed [s/m] of a law without bristles.
+
+    It is mu(v) g(v) + viscous (eq. 15, 35) at a slip speed [m/s]; without friction 0.
     """
-    if friction.law == "none":
+    law = LAWS[friction.law]
+    if not law.has_friction:
         return 0.0
-    along = regularised_direction(friction, speed)
+    along = law.direction(friction, speed)
     return sliding_friction(friction, speed) * along + friction.viscous
 
 
@@ -198,25 +220,41 @@ def lugre_friction(friction: Friction, normal: float, slip: Array, bristle: Arra
 
 @dataclass(frozen=True)
 class FrictionLaw:
-    """A row of the table."""
+    """A row of the table: all that other files ask about a law."""
 
-    grip: Callable[[Friction, float, Array, Array], Grip]  # of load [N], slip and deflection
+    # g(v) [s/m] at a speed [m/s]; of laws with bristles that of the moments (eq. 38)
+    direction: Callable[[Friction, float], float] = regularised_direction
+    # the slip speed [m/s] of shares of mu f_n; None: no foot creeps
+    creep: Callable[[Friction, Array], Array] | None = None
+    # of load [N], slip and deflection
+    grip: Callable[[Friction, float, Array, Array], Grip] = sliding_grip
     # the part (..., 3) of the slip that stretches no bristle [m/s]; None: no bristles
     sliding: Callable[[Friction, Array, Array], Array] | None = None
-    has_static: bool = True  # whether mu_static counts
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether the law has forces along the ground."""
+        return self.direction is not no_friction
+
+    @property
+    def has_bristles(self) -> bool:
+        """Whether a foot stands on bristles."""
+        return self.sliding is not None
+
+    @property
+    def creeps(self) -> bool:
+        """Whether a foot creeps under any force along the ground."""
+        return self.creep is not None
 
 
 # in the order of their numbers in the FMU, so that a new law is the last one
 LAWS = {
-    "tanh": FrictionLaw(tanh_friction),
-    "none": FrictionLaw(no_friction, has_static=False),
-    "bristle": FrictionLaw(bristle_friction, bristle_sliding),
-    "lugre": FrictionLaw(lugre_friction, lugre_sliding),
+    "tanh": FrictionLaw(creep=tanh_creep),
+    "none": FrictionLaw(no_friction),
+    "bristle": FrictionLaw(grip=bristle_friction, sliding=bristle_sliding),
+    "lugre": FrictionLaw(grip=lugre_friction, sliding=lugre_sliding),
 }
 FRICTION_LAWS = tuple(LAWS)
-STATIC_LAWS = tuple(name for name, law in LAWS.items() if law.has_static)
-# under which a foot can hold
-BRISTLE_LAWS = tuple(name for name, law in LAWS.items() if law.sliding is not None)
 
 
 def friction_grip(friction: Friction, normal: float, slip: Array, bristle: Array) -> Grip:
@@ -257,8 +295,7 @@ def turning_slopes(
     radius: that of the sphere [m]; its speeds R |w_n| and R |w_t| regularise the moments.
     normal: (3,) of the ground; turn: angular velocity (3,) [rad/s].
     """
-    if friction.law == "none":
-        return 0.0, 0.0
+    direction = LAWS[friction.law].direction
     spin = float(normal @ turn)
     slow = radius * abs(spin)
     fast = radius * float(np.linalg.norm(turn - spin * normal))
@@ -266,8 +303,8 @@ def turning_slopes(
         friction.spin_radius
         * radius
         * sliding_friction(friction, slow)
-        * regularised_direction(friction, slow),
-        friction.rolling_radius * radius * regularised_direction(friction, fast),
+        * direction(friction, slow),
+        friction.rolling_radius * radius * direction(friction, fast),
     )
 
 

@@ -152,8 +152,7 @@ def try_step(start: Start, h: float) -> Trial:
     )
     y_1, estimate = method_step(method, stage, y_0, h)
     _, body, bristle, rotors = _parts(y_1)
-    controlled = method.error_order > 0 and solver.step == 0.0
-    error = error_norm(robot, estimate[TURN:]) if controlled else 0.0
+    error = error_norm(robot, estimate[TURN:]) if solver.step == 0.0 else 0.0
     body[:, 3:7] /= np.linalg.norm(body[:, 3:7], axis=1, keepdims=True)
     if solver.projection == "step":
         body = project(robot, body)
@@ -336,7 +335,7 @@ def step_factor(method: Method, error: float) -> float:
     """Returns the factor by which the step may change after a trial with this error (eq. 23)."""
     if error <= 0.0 or math.isnan(error):
         return 0.2 if math.isnan(error) else 5.0
-    return float(np.clip(0.9 * error ** (-1.0 / (method.error_order + 1)), 0.2, 5.0))
+    return float(np.clip(0.9 * error ** (-1.0 / method.order), 0.2, 5.0))
 
 
 def advance(start: Start, h_max: float, next_step: float) -> tuple[State, float, float]:

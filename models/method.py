@@ -21,8 +21,7 @@ Stage = Callable[[float, Array, Array], Array]
 class Method:
     """Coefficients of a method with s stages (eq. 19) and of its error estimate."""
 
-    order: int
-    error_order: int  # of the embedded method; 0: none, fixed steps only
+    order: int  # one more than that of the embedded method
     gamma: float  # 0: explicit
     a: Array  # (s, s)
     g: Array  # (s, s)
@@ -47,7 +46,7 @@ def method_step(method: Method, stage: Stage, y_0: Array, h: float) -> tuple[Arr
         h: length of the step [s].
 
     Returns:
-        y_1 (n,) and the estimate of its error (n,), which is 0 without an embedded method.
+        y_1 (n,) and the estimate of its error (n,).
     """
     k = np.zeros((method.stages, len(y_0)))
     for i in range(method.stages):
@@ -67,7 +66,7 @@ def _row(
     order: int,
     a: Sequence[Sequence[float]],
     b: Sequence[float],
-    e: Sequence[float] | None = None,
+    e: Sequence[float],
     gamma: float = 0.0,
     g: Sequence[Sequence[float]] = ((),),
 ) -> Method:
@@ -75,13 +74,12 @@ def _row(
     s, matrix = len(b), _lower(a)
     return Method(
         order=order,
-        error_order=0 if e is None else order - 1,
         gamma=gamma,
         a=matrix,
         g=_lower(g) if gamma > 0.0 else np.zeros((s, s)),
         c=matrix.sum(axis=1),
         b=np.array(b),
-        e=np.zeros(s) if e is None else np.array(e),
+        e=np.array(e),
     )
 
 
@@ -125,16 +123,5 @@ METHOD: dict[str, Method] = {
         ],
         b=[35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84, 0.0],
         e=[71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40],
-    ),
-    # Bogacki and Shampine 1989
-    "bs32": _row(
-        order=3,
-        a=[[], [1 / 2], [0.0, 3 / 4], [2 / 9, 1 / 3, 4 / 9]],
-        b=[2 / 9, 1 / 3, 4 / 9, 0.0],
-        e=[2 / 9 - 7 / 24, 1 / 3 - 1 / 4, 4 / 9 - 1 / 3, -1 / 8],
-    ),
-    # classic method of Kutta
-    "rk4": _row(
-        order=4, a=[[], [1 / 2], [0.0, 1 / 2], [0.0, 0.0, 1.0]], b=[1 / 6, 1 / 3, 1 / 3, 1 / 6]
     ),
 }

@@ -132,7 +132,7 @@ def _friction(robot: Robot) -> Vector3:
     MuJoCo's moments are at most the latter two times the normal force; ours are mu r_s f_n against
     spin and r_r f_n against rolling.
     """
-    if robot.friction.law == "none":
+    if not robot.friction.has_friction:
         return (0.0, 0.0, 0.0)
     mu = robot.friction.mu
     return (mu, mu * robot.friction.spin_radius, robot.friction.rolling_radius)

@@ -26,7 +26,6 @@ from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force, foot_moment
 from hexapod_cosim.models.dynamics import masses, stop_torques
 from hexapod_cosim.models.errors import RobotError
-from hexapod_cosim.models.friction import BRISTLE_LAWS
 from hexapod_cosim.models.ground.faces import ground, ground_height, ground_normal, surface_of
 from hexapod_cosim.models.kinematics import (
     JOINTS,
@@ -89,9 +88,9 @@ def sliding(gravity: Array, normal: Array, mu: float, mu_static: float = 0.0) ->
 
 def _slide_acceleration(robot: Robot) -> Array:
     """Returns the acceleration (3,) [m/s2] with which the robot slides on its ground."""
-    mu = 0.0 if robot.friction.law == "none" else robot.friction.mu
+    mu = robot.friction.mu if robot.friction.has_friction else 0.0
     # under the tanh law static friction holds no foot
-    mu_static = robot.friction.mu_static if robot.friction.law in BRISTLE_LAWS else 0.0
+    mu_static = robot.friction.mu_static if robot.friction.has_bristles else 0.0
     return sliding(np.array(robot.gravity), ground_normal(robot.terrain), mu, mu_static)
 
 
@@ -108,7 +107,7 @@ def _standing_key(robot: Robot) -> Robot:
     gravity, normal = np.array(robot.gravity), ground_normal(robot.terrain)
     press = -float(gravity @ normal)
     level = float(np.linalg.norm(gravity + press * normal)) <= LEVEL * press
-    if level and (friction.law not in BRISTLE_LAWS or max(friction.mu, friction.mu_static) == 0.0):
+    if level and (not friction.has_bristles or max(friction.mu, friction.mu_static) == 0.0):
         friction = replace(friction, law="tanh", mu=1.0, mu_static=0.0, viscous=0.0)
     still = Gait(name="tripod", period=1.0, duty=0.5, stride=0.0, step_height=1.0)
     return replace(
@@ -122,12 +121,11 @@ def _in_sliding_frame(robot: Robot, slide: Array) -> Robot:
     Gravity is reduced by the frame's acceleration, and friction is raised so that it holds the
     robot.
     """
-    mu = (
-        1.0 if robot.friction.law == "none" or robot.friction.mu == 0.0 else 2.0 * robot.friction.mu
-    )
+    friction = robot.friction
+    mu = 2.0 * friction.mu if friction.has_friction and friction.mu != 0.0 else 1.0
     x, y, z = (np.array(robot.gravity) - slide).tolist()
     return replace(
-        robot, gravity=(x, y, z), friction=replace(robot.friction, law="tanh", mu=mu, mu_static=0.0)
+        robot, gravity=(x, y, z), friction=replace(friction, law="tanh", mu=mu, mu_static=0.0)
     )
 
 
@@ -296,7 +294,7 @@ def _bristles(robot: Robot, body: Array) -> Array:
 
     The unknown creep stands for the deflection: one presliding for each m/s.
     """
-    if robot.friction.law not in BRISTLE_LAWS:
+    if not robot.friction.has_bristles:
         return np.zeros((LEGS, 3))
     return np.array(
         [
@@ -309,7 +307,7 @@ def _bristles(robot: Robot, body: Array) -> Array:
 def _foot_forces(robot: Robot, body: Array) -> Array:
     """Returns the forces (6, 3) of the ground on the feet [N]; feet with bristles are at rest."""
     feet, bristle = foot_contacts(robot, body), _bristles(robot, body)
-    if robot.friction.law in BRISTLE_LAWS:
+    if robot.friction.has_bristles:
         feet = tuple(replace(foot, velocity=np.zeros(3), approach_speed=0.0) for foot in feet)
     return np.array([foot_force(robot, foot, 0.0, bristle[leg]) for leg, foot in enumerate(feet)])
 
@@ -338,7 +336,7 @@ def _loads(robot: Robot, x: Array) -> Array:
         tibia = JOINTS * (leg + 1)
         force[tibia] += push
         moment[tibia] += cross(foot.point - body[tibia, 0:3], push)
-        if robot.friction.law not in BRISTLE_LAWS:
+        if not robot.friction.has_bristles:
             moment[tibia] += foot_moment(robot, foot, 0.0, body[tibia, 10:13])
     on_torso, left_over = _carry_to_torso(robot, body, force, moment)
     angle = x[TORSO:]
@@ -377,7 +375,7 @@ def _standing(robot: Robot, x: Array) -> Standing:
     """Returns the pose of rest of the unknowns."""
     position, angle = np.array([0.0, 0.0, x[0]]), x[6:].reshape(LEGS, JOINTS)
     body = _bodies(robot, x)
-    creep = np.zeros(3) if robot.friction.law in BRISTLE_LAWS else _velocity(robot, x)
+    creep = np.zeros(3) if robot.friction.has_bristles else _velocity(robot, x)
     return Standing(
         position,
         _attitude(x),
@@ -393,7 +391,7 @@ def _sliding(robot: Robot, pose: Standing, slide: Array) -> Standing:
     """Returns the pose of a sliding robot: without creep, with fully deflected bristles."""
     way = (
         robot.friction.presliding * slide / np.linalg.norm(slide)
-        if robot.friction.law in BRISTLE_LAWS
+        if robot.friction.has_bristles
         else np.zeros(3)
     )
     return replace(pose, velocity=np.zeros(3), bristle=np.tile(way, (LEGS, 1)), slide=slide)

@@ -146,6 +146,13 @@ hxStatus hx_component_step(hxComponent *component, const struct hxVariables *var
   return hx_plant_step_ramp(component->plant, &variables->input, rate, t_end);
 }
 
+static hxStatus tune(hxComponent *component, struct hxVariables *variables) {
+  const hxStatus status = hx_plant_tune(component->plant, &variables->definition);
+  component->message[0] = '\0';
+  if (status == HX_OK) hx_plant_get_coordinates(component->plant, &variables->state);
+  return status;
+}
+
 void hx_component_output(hxComponent *component, struct hxVariables *variables, unsigned groups) {
   hx_plant_output_groups(component->plant, &variables->input, groups & HX_OUTPUT_ALL,
                          &variables->output);
@@ -252,6 +259,7 @@ static const hxContinuous continuous = {
     .rates = rates,
     .completed = completed,
     .step = step,
+    .tune = tune,
     .indicate = indicate,
     .update = update,
     .tangent = tangent,

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hexapod_cosim.controller import DEFAULT_PERIOD, make_gait
+from hexapod_cosim.cosim.cli.extension import extensions_in, loaded
 from hexapod_cosim.cosim.common.components import PLANT, Component
 from hexapod_cosim.cosim.export.start_values import start_values
 from hexapod_cosim.cosim.interface.arrays import arrays
@@ -28,12 +29,8 @@ from hexapod_cosim.cosim.interface.controller import (
     load_controller_interface,
 )
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
-from hexapod_cosim.cosim.interface.plant import (
-    CAUSALITIES,
-    Interface,
-    Variable,
-    load_interface,
-)
+from hexapod_cosim.cosim.interface.plant import load_interface
+from hexapod_cosim.cosim.interface.records import CAUSALITIES, Interface, Variable
 from hexapod_cosim.models.robot import load_robot
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -97,20 +94,14 @@ def render_all() -> dict[Path, str]:
 
 
 def interfaces() -> tuple[Interface, ...]:
-    """Returns the interfaces of plant and controller of the default robot, and that of a policy if
-    the extension gym exists.
+    """Returns the interfaces of plant and controller of the default robot, and those of the
+    extensions.
     """
     robot = load_robot(DEFAULT_ROBOT)
     setup = ControllerSetup(robot=robot, gait=make_gait(robot), period=DEFAULT_PERIOD)
-    core = (load_interface(robot), load_controller_interface(setup))
-    if not (ROOT / "extensions" / "gym").is_dir():
-        return core
-    from hexapod_cosim.extensions.gym.policy import (  # noqa: PLC0415  may be deleted
-        load_policy_interface,
-        standing_policy,
-    )
-
-    return (*core, load_policy_interface(standing_policy(DEFAULT_ROBOT), robot))
+    added = [place for extension in extensions_in(ROOT) for place in extension.interfaces]
+    core = load_interface(robot), load_controller_interface(setup)
+    return (*core, *(loaded(place)() for place in added))
 
 
 def descriptions(folder: Path) -> dict[Path, str]:

@@ -1,5 +1,5 @@
 """Writes the sources of the FMUs that the repository does not have, before they are compiled:
-generated/variables.h and variables.c of each FMU, and defaults.c of the policy.
+generated/variables.h and variables.c of each FMU, and defaults.c of the extensions' FMUs.
 
 usage: python tools/generate_sources.py FOLDER     (called by plant_fmu/CMakeLists.txt)
 
@@ -24,15 +24,11 @@ COMMITTED = (
 
 
 def import_from(folder: Path) -> None:
-    """Makes a folder the package hexapod_cosim. The part gym is imported without its __init__.py,
-    which requires Gymnasium.
-    """
+    """Makes a folder the package hexapod_cosim."""
     sys.meta_path.insert(0, PathFinder)  # before the finder of an editable installation
-    gym = folder / "extensions" / "gym"
-    for name, place in (("hexapod_cosim", folder), ("hexapod_cosim.extensions.gym", gym)):
-        package = ModuleType(name)
-        package.__path__ = [str(place)]
-        sys.modules[name] = package
+    package = ModuleType("hexapod_cosim")
+    package.__path__ = [str(folder)]
+    sys.modules["hexapod_cosim"] = package
 
 
 def main(folder: Path) -> None:

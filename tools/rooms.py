@@ -20,9 +20,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs" / "images" / "rooms.svg"
 PACKAGE = "hexapod_cosim"
 C_NAMES = {
-    "extensions/gym/policy_fmu": "policy_fmu",
-    "extensions/gym/loop": "gym loop",
-    "cosim/master": "master",
+    path.parent.relative_to(ROOT).as_posix(): " ".join(path.relative_to(ROOT).parts[1:-1])
+    for path in sorted([*ROOT.glob("extensions/*/*/src"), ROOT / "cosim" / "master" / "src"])
 }
 C_ROOMS = ("fmi", "plant_fmu", "controller/fmu", *C_NAMES)
 SHARED = (

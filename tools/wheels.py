@@ -37,14 +37,14 @@ from packaging.tags import platform_tags
 from rich.console import Console
 from wheel.wheelfile import WheelFile, get_zipinfo_datetime
 
+from hexapod_cosim.cosim.cli.extension import extensions_in, loaded
 from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, Component
 from hexapod_cosim.cosim.common.plant_files import LOOP, fmi_headers
-from hexapod_cosim.cosim.export.cross_build import ALL_TARGETS, TARGETS, Library, build_library
+from hexapod_cosim.cosim.export.cross_build import TARGETS, Library, build_library
 from hexapod_cosim.cosim.export.platforms import component_library
 
 ROOT = Path(__file__).parents[1]
 BINARIES, LIBRARIES = "hexapod_cosim/plant/binaries/", "hexapod_cosim/plant/lib/"
-MODULE = "hexapod_cosim/plant/browser/robot.wasm"
 BEST = 9  # level of compression
 LARGEST = 5_000_000  # bytes of a wheel
 OTHERS = "other_platforms"  # folder of the wheels that do not fit this machine
@@ -84,10 +84,9 @@ def main(folder: Path) -> None:
         source, base = build_source(folder)
     with console.status("compiling for all platforms (minutes, the first time)"):
         binaries = cross_compile()
-    if (ROOT / "extensions" / "live").is_dir():
-        from hexapod_cosim.extensions.live.static_page import robot_module  # noqa: PLC0415
-
-        base[MODULE] = robot_module()
+    for extension in extensions_in(ROOT):
+        for name, place in extension.release.items():
+            base[f"hexapod_cosim/plant/{name}"] = loaded(place)()
     base |= bill_of_materials(base)
     wheels = [
         write_wheel(base, platform, binaries, folder if platform.fits else folder / OTHERS)
@@ -150,12 +149,8 @@ def bill_of_materials(base: Mapping[str, bytes]) -> dict[str, bytes]:
 
 def components() -> list[Component]:
     """Returns the components whose binaries a wheel holds."""
-    found = [PLANT, CONTROLLER]
-    if (ROOT / "extensions" / "gym").is_dir():
-        from hexapod_cosim.extensions.gym.policy import POLICY  # noqa: PLC0415
-
-        found.append(POLICY)
-    return found
+    added = [place for extension in extensions_in(ROOT) for place in extension.interfaces]
+    return [PLANT, CONTROLLER, *(loaded(place)().component for place in added)]
 
 
 def cross_compile() -> dict[tuple[str, str], bytes]:
@@ -169,12 +164,12 @@ def cross_compile() -> dict[tuple[str, str], bytes]:
 
 def loop_library() -> Library:
     """Returns the co-simulation loops as a library, as cosim/master/CMakeLists.txt builds it."""
-    plant, loops = ROOT / "plant_fmu", ("cosim/master", "extensions/gym/loop")
+    plant, loops = ROOT / "plant_fmu", [ROOT / "cosim/master", *ROOT.glob("extensions/*/loop")]
     files = {}
-    for include in (plant / "include", *(ROOT / loop / "include" for loop in loops)):
+    for include in (plant / "include", *(loop / "include" for loop in loops)):
         files |= {path.relative_to(include).as_posix(): path for path in include.rglob("*.h")}
     for loop in loops:
-        files |= {f"src/{path.name}": path for path in (ROOT / loop / "src").glob("*.[ch]")}
+        files |= {f"src/{path.name}": path for path in (loop / "src").glob("*.[ch]")}
     files["src/message.c"] = plant / "src" / "message.c"
     flags = ("-DHX_SHARED", "-pthread")
     return Library(LOOP, dict(sorted(files.items())), (fmi_headers(),), flags)
@@ -196,7 +191,7 @@ def write_wheel(
     members = dict(base)
     members[description] = wheel_description(base[description], platform.tag)
     for (library, target), data in binaries.items():
-        suffix = ALL_TARGETS[target].suffix
+        suffix = TARGETS[target].suffix
         if library != LOOP:
             members[f"{BINARIES}{target}/{library}{suffix}"] = data
         elif target == platform.target:

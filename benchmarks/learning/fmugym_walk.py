@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks import BUILD
+from benchmarks.environment_steps import steps_per_second, walking_action, ways
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.sensors import MEASURED
 from hexapod_cosim.cosim.master.signals import JOINT_COMMANDS
-from hexapod_cosim.extensions.gym.bench import steps_per_second, walking_action, ways
 from hexapod_cosim.extensions.gym.plants import export_plant, grounds
 from hexapod_cosim.extensions.gym.settings import JOINTS, RATE, EnvSettings
 from hexapod_cosim.models.records import Array

@@ -17,11 +17,9 @@ static const struct {
   const char *name;
   int method, fixed;
 } methods[] = {
-    {"rosw3", HX_METHOD_ROSW3, 0},   {"rosw3-fixed", HX_METHOD_ROSW3, 1},
-    {"ros2", HX_METHOD_ROS2, 0},     {"ros2-fixed", HX_METHOD_ROS2, 1},
-    {"dp54", HX_METHOD_DP54, 0},     {"dp54-fixed", HX_METHOD_DP54, 1},
-    {"bs32", HX_METHOD_BS32, 0},     {"bs32-fixed", HX_METHOD_BS32, 1},
-    {"rk4-fixed", HX_METHOD_RK4, 1},
+    {"rosw3", HX_METHOD_ROSW3, 0}, {"rosw3-fixed", HX_METHOD_ROSW3, 1},
+    {"ros2", HX_METHOD_ROS2, 0},   {"ros2-fixed", HX_METHOD_ROS2, 1},
+    {"dp54", HX_METHOD_DP54, 0},   {"dp54-fixed", HX_METHOD_DP54, 1},
 };
 
 static int prepare(void *self, const Walk *walk, const char *method, double step) {

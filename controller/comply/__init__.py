@@ -1,4 +1,4 @@
 """Corrects the planned joint commands by foot forces: support, squeeze, paper.
 
-Imports `sense`, `walk`, `gains`, `memory`, `parts` and `plane`.
+Imports `sense`, `walk`, `gains`, `memory` and `plane`.
 """

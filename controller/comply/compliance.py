@@ -20,9 +20,8 @@ import math
 import numpy as np
 
 from hexapod_cosim.controller.comply.load_plan import LoadPlan
-from hexapod_cosim.controller.gains import TRIPOD_LEGS, Gains
+from hexapod_cosim.controller.gains import TRIPOD_LEGS, Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, along, clamp, square
 from hexapod_cosim.controller.sense.burden import Burden
 from hexapod_cosim.controller.sense.contact_detection import ContactDetector

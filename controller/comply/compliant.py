@@ -24,9 +24,8 @@ from hexapod_cosim.controller.comply.load_plan import LoadPlan, plan_load
 from hexapod_cosim.controller.comply.planned_squeeze import PlannedSqueeze
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.comply.support import Support
-from hexapod_cosim.controller.gains import Gains
+from hexapod_cosim.controller.gains import Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, cis, clamp
 from hexapod_cosim.controller.sense.load_adaptation import LoadAdaptation
 from hexapod_cosim.controller.signals import JointCommand, Measurement
@@ -174,16 +173,18 @@ class Compliant(Stateful):
             period=self.period,
         )
 
-    def lowered(self, phase: Array, plane: Plane, clock: GaitClock) -> tuple[Array, Array]:
+    def lowered(
+        self, phase: Array, plane: Plane, clock: GaitClock, presence: Array
+    ) -> tuple[Array, Array]:
         """Returns the activations of the legs (6,) and the lowering of their feet (6,) [m].
 
         phase: (6,) of the legs [1]; plane: (6,) feet x + i y, walking frame [m]; clock: of the
-        gait, in the section of the step.
+        gait, in the section of the step; presence: (6,) factors of the legs [1].
         """
         activation = self.support.activation(
             phase, clock.stayed, clock.stays, walking=clock.walking
         )
-        activation = np.where(clock.awaited, 0.0, activation)
+        activation = np.where(clock.awaited, 0.0, activation * presence)
         return activation, self.support.lowering(plane, activation)
 
     # ------------------------------------------------------------------------------- steering

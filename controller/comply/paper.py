@@ -20,9 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hexapod_cosim.controller.comply.shares import LEAST_LOAD, indentation
-from hexapod_cosim.controller.gains import Gains
+from hexapod_cosim.controller.gains import Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, along, clamp, square
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.kinematics import Feet, Joints, LegSolver, Pose, Softness

@@ -59,15 +59,10 @@ class PlannedSqueeze:
         """
         (xx, xy, yy), x, y = yielding, arm.real, arm.imag
         tx, ty = xy * x - xx * y, yy * x - xy * y
-        system = np.array(
-            [
-                [xx.sum(), xy.sum(), tx.sum()],
-                [xy.sum(), yy.sum(), ty.sum()],
-                [tx.sum(), ty.sum(), (ty * x - tx * y).sum()],
-            ]
-        )
-        total, twist = change.sum(), float(across(arm, change).sum())
-        a, b, c = solve(system, (total.real, total.imag, twist)).tolist()
+        turning, twists = ty * x - tx * y, across(arm, change)
+        *system, twist = np.array((xx, xy, tx, yy, ty, turning, twists)).sum(axis=1).tolist()
+        total = change.sum()
+        a, b, c = solve(system, (total.real, total.imag, twist))
         held = xx * a + xy * b + tx * c + 1j * (xy * a + yy * b + ty * c)
         return np.asarray(change - held)
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hexapod_cosim.controller.plane import Array, Plane, rows_of
 
+Vector = tuple[float, float, float]
 RIDGE_SHARE = 1e-9  # 1    of the mean square arm: makes the system of feet on one line regular
 LEAST_ARM = 1e-12  # m2    makes the system without any standing foot regular
 LEAST_LOAD = 1e-6  # N    floor of the sum of loads that the shares are divided by
@@ -31,12 +33,12 @@ def indentation(load: Any, stiffness: float) -> Any:
     return np.cbrt(load / stiffness) ** 2
 
 
-def solve(system: Array, needed: tuple[float, float, float]) -> Array:
-    """Solves S x = b for x (3,), S (3, 3) symmetric and positive semidefinite, by S = L D L^T.
+def solve(system: Sequence[float], needed: tuple[float, float, float]) -> Vector:
+    """Solves S x = b, S (3, 3) symmetric and positive semidefinite, by S = L D L^T.
 
-    A ridge on the diagonal makes S definite.
+    A ridge on the diagonal makes S definite. system: S_00, S_01, S_02, S_11, S_12, S_22.
     """
-    (s00, s01, s02), (_, s11, s12), (_, _, s22) = system.tolist()
+    s00, s01, s02, s11, s12, s22 = system
     ridge = RIDGE_SHARE * (s00 + s11 + s22) + LEAST_ARM
     d0, s11, s22 = s00 + ridge, s11 + ridge, s22 + ridge
     b0, b1, b2 = needed
@@ -48,4 +50,4 @@ def solve(system: Array, needed: tuple[float, float, float]) -> Array:
     y2 = b2 - l20 * b0 - l21 * y1
     x2 = y2 / d2
     x1 = y1 / d1 - l21 * x2
-    return np.array([b0 / d0 - l10 * x1 - l20 * x2, x1, x2])
+    return b0 / d0 - l10 * x1 - l20 * x2, x1, x2

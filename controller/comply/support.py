@@ -20,6 +20,7 @@ from hexapod_cosim.models import Robot
 
 LEAST_SPREAD = 1e-4  # m2    mean square distance of the feet from their centre: below it no twist
 ONES = np.ones(LEGS)
+UPPER = np.triu_indices(3)  # of a symmetric system
 
 
 def _smooth(x: Array) -> Array:
@@ -61,8 +62,8 @@ class Support:
             return np.ones_like(phase)
         half = 0.5 * self.handover
         since = (phase + half) % 1.0  # cycles since the activation began to rise
-        rising = _smooth(since / self.handover)
-        falling = _smooth((self.duty + 2.0 * half - since) / self.handover)
+        until = self.duty + 2.0 * half - since  # cycles until it has fallen
+        rising, falling = _smooth(np.array((since, until)) / self.handover)
         # a leg that did not step has kept its load
         handing = np.minimum(np.where(stayed, 1.0, rising), np.where(stays, 1.0, falling))
         return np.where(stayed & (phase >= self.duty), 1.0, handing)
@@ -78,8 +79,9 @@ class Support:
         """
         one = np.array([ONES, feet.real, feet.imag])
         weighted = one * activation
-        found = solve(weighted @ one.T, (weight, moment.real, moment.imag))
-        return np.maximum(found @ weighted, 0.0)
+        system = (weighted @ one.T)[UPPER].tolist()
+        found = solve(system, (weight, moment.real, moment.imag))
+        return np.maximum(np.array(found) @ weighted, 0.0)
 
     def lowering(self, feet: Plane, activation: Array) -> Array:
         """Returns by how much the feet (6,) are lowered for the torso to keep its height [m] (C21).

@@ -1,11 +1,10 @@
-"""Draws the loops of the paper's control: Bode and Nyquist diagrams, responses to shifts, margins.
+"""Draws the loops of the paper's control: a Bode diagram, responses to shifts, and margins.
 
-The diagrams show all eigenloci; margins are drawn over delay and over the shares.
+The diagram shows all eigenloci; margins are drawn over delay and over the shares.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -37,7 +36,7 @@ COLOURS = {"worst": PALETTE[3], "others": "0.75", "asked": PALETTE[0], "without"
 
 
 def plot_design(robot: Robot, gains: Gains, plants: Plants, directory: str | Path) -> list[Path]:
-    """Writes `bode`, `nyquist`, `step` and `margins` as SVG and PNG; returns the paths.
+    """Writes `bode`, `step` and `margins` as SVG and PNG; returns the paths.
 
     robot, plants: those that the gains were designed for. Raises GainsError for gains of another
     robot, or when the figures cannot be written.
@@ -61,7 +60,6 @@ def plot_design(robot: Robot, gains: Gains, plants: Plants, directory: str | Pat
         with rc_context(SETTINGS):
             figures = {
                 "bode": _bode(loci, loops.omega, gains),
-                "nyquist": _nyquist(loci, gains),
                 "step": _step(loops, gains),
                 "margins": _margins(loci, loops, gains),
             }
@@ -140,24 +138,6 @@ def _bode(loci: Response, omega: Array, gains: Gains) -> Any:
         yticks=range(-540, 181, 180),
     )
     _legend_below(figure, size, angle)
-    return figure
-
-
-def _nyquist(loci: Response, gains: Gains) -> Any:
-    figure, ((axes,),) = _figure(1, 1, gains)
-    figure.set_figheight(4.4)
-    needs, turn = gains.requirements, np.linspace(0.0, 2.0 * np.pi, 200)
-    edge = math.radians(needs.phase_margin)
-    arc = np.pi + np.linspace(-edge, edge, 60)
-    _each(loci, lambda locus, **how: axes.plot(locus.real, locus.imag, **how))
-    axes.plot(np.cos(turn), np.sin(turn), color="k", lw=0.5)
-    asked = {"color": COLOURS["asked"], "lw": 2.0}
-    axes.plot(np.cos(arc), np.sin(arc), label="margins asked: not through here", **asked)
-    axes.plot([-1.0, -(10.0 ** (-needs.gain_margin / 20.0))], [0.0, 0.0], **asked)
-    axes.plot([-1.0], [0.0], "k+", ms=10)
-    axes.set(xlabel="real part [1]", ylabel="imaginary part [1]", aspect="equal")
-    axes.set(xlim=(-1.3, 1.3), ylim=(-1.3, 1.3), xticks=range(-1, 2), yticks=range(-1, 2))
-    _legend_below(figure, axes)
     return figure
 
 

@@ -16,13 +16,11 @@ from hexapod_cosim.controller.design.standing import StandingPlant
 from hexapod_cosim.controller.gains import (
     Gains,
     GainsError,
-    HoldGains,
     Margins,
     Requirements,
-    SupportGains,
-    raising_gains_errors,
 )
-from hexapod_cosim.controller.size import limit_gains, requirements_for, taken
+from hexapod_cosim.controller.gains_file import raising_gains_errors
+from hexapod_cosim.controller.size import requirements_for, sections_for
 from hexapod_cosim.models import LEG_NAMES, Robot
 from hexapod_cosim.models.schema import check_record
 
@@ -58,10 +56,7 @@ def design_gains(
         robot_hash=robot.hash,
         period=period,
         requirements=needs,
-        support=taken(SupportGains, needs),
-        hold=taken(HoldGains, needs),
-        limits=limit_gains(robot, needs),
-        paper=paper.gains,
+        **sections_for(robot, needs) | {"paper": paper.gains},
         margins=Margins(
             support_torque=support_torque(robot, plants),
             binding=paper.binding,

@@ -1,4 +1,4 @@
-"""Derives contacts, touch-downs, landings and the carried weight from measured foot forces.
+"""Derives contacts, touch-downs, trust in the plan and the carried weight from foot forces.
 
 Imports `memory` and `plane`.
 """

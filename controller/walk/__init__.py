@@ -1,4 +1,4 @@
 """Plans the walk from the command: gait, foot paths, inverse kinematics and dynamics, slow loops.
 
-Imports `memory` and `plane`.
+Imports `gains`, `memory` and `plane`.
 """

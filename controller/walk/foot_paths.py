@@ -12,20 +12,30 @@ without sliding.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, cis
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, across, cis
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.gait_clock import CLOCK_EPSILON, NO_LEG, GaitClock
 from hexapod_cosim.controller.walk.swing import Twist, blend, hop, travel
 
+# 1/s, m/s    downwards, of feet that end their swings at once
+DROP_RATE, LANDING_SPEED = 10.0, 0.08
+AROUND = (0, 1, 2, 5, 4, 3)  # the legs around the robot, to the left
 FREEZE = 0.75  # 1    part of the swing after which the landing point stays fixed to the ground
 SAME_DISTANCE = 1e-6  # m    distances that differ by less are equal
 HOME_TOLERANCE = 1e-9  # m    a foot this close to its stance position need not step any more
 NEARLY_DONE = 1e-12  # 1    floor of 1 - s
+
+
+def inside(corners: Plane) -> float:
+    """Returns how far the origin is inside a polygon [m], < 0 outside. corners: to the left [m]."""
+    side = np.roll(corners, -1) - corners
+    return float((across(corners, side) / np.abs(side)).min())
 
 
 class PlannedFeet(NamedTuple):
@@ -137,6 +147,12 @@ class FootPaths(Stateful):
 
         carried: (6,) feet at the step before, ground frame [m].
         """
+        away = self.clock.absent
+        if away.any():  # these feet are above their stance positions
+            place = feet.way + cis(feet.turn) * self._aims()
+            feet = feet._replace(
+                goal=np.where(away, place, feet.goal), pull=np.where(away, 0.0, feet.pull)
+            )
         back, tau = cis(-feet.turn), self.clock.progress(feet.phase)
         s, slope = blend(tau)
         feet = feet._replace(blend=np.where(self.clock.swinging, s, 0.0))
@@ -151,11 +167,17 @@ class FootPaths(Stateful):
         pulled = back * feet.pull * (slope * pace)
         # a foot on the ground: dp/dt = -(v + i w p)
         velocity = pulled - (feet.twist.velocity + 1j * feet.twist.yaw_rate * was)
+        dropped = self.clock.dropped & self.clock.swinging
+        high = feet.height - self.home_height
+        fall = np.maximum(DROP_RATE * high, LANDING_SPEED)
+        low = np.maximum(high - fall * self.period, 0.0)
+        lift = np.where(dropped, low, lift)
+        lift = np.where(self.clock.swinging, lift, np.where(away, self.gait.step_height, 0.0))
         return feet._replace(
             plane=back * (self._ground_of(feet) - feet.way),
-            height=self.home_height + np.where(self.clock.swinging, lift, 0.0),
-            velocity=velocity,
-            rise=np.where(self.clock.swinging, climb * pace, 0.0),
+            height=self.home_height + lift,
+            velocity=np.where(away, 0.0, velocity),
+            rise=np.where(self.clock.swinging, np.where(dropped, -fall, climb * pace), 0.0),
         )
 
     def _set_out(self, now: PlannedFeet, twist: Twist) -> PlannedFeet:
@@ -165,7 +187,8 @@ class FootPaths(Stateful):
         s = np.where(clock.swinging, blend(clock.progress(phase))[0], 0.0)
         pull = np.where(clock.swinging, now.pull, 0.0)
         feet = now._replace(phase=phase, blend=s, pull=pull, twist=twist)
-        return self._place_feet(feet, self._ground_of(feet))
+        feet = self._place_feet(feet, self._ground_of(feet))
+        return feet._replace(height=np.where(clock.dropped, now.height, feet.height))
 
     def plan(self, now: PlannedFeet, number: int, *, going: bool, twist: Twist) -> PlannedFeet:
         """Begins a new section after the present step.
@@ -183,6 +206,7 @@ class FootPaths(Stateful):
         clock = self.clock
         if not clock.walking and not going:
             return self._rest(now.plane)
+        clock.land(self.down(now))
         swung, kept = clock.swinging, clock.stays
         clock.begin_section(number)
         if clock.ending:
@@ -211,28 +235,58 @@ class FootPaths(Stateful):
         left = self.gait.duty - begin + CLOCK_EPSILON
         time = (left - np.floor(left)) * self.gait.period
         motion = feet.twist.velocity + 1j * feet.twist.yaw_rate * feet.plane
-        return float(np.abs(feet.plane - motion * time - self._aims()).max())
+        far = np.abs(feet.plane - motion * time - self._aims())
+        return float(far[~self.clock.absent].max())
 
-    def join(self, feet: PlannedFeet) -> PlannedFeet:
+    def _steadiness(
+        self, feet: PlannedFeet, begin: Array, torso: Callable[[int], complex]
+    ) -> float:
+        """Returns the least distance of the torso within its support in the coming steps [m] (C58).
+
+        feet, begin: as for _farthest(); torso: its way from its nominal place [m].
+        """
+        left = self.gait.duty - begin + CLOCK_EPSILON
+        lift = (left - np.floor(left)) * self.gait.period
+        motion = feet.twist.velocity + 1j * feet.twist.yaw_rate * feet.plane
+        ahead = self._aims() + motion * (self.landing_lead + lift)
+        least = np.inf
+        for leg in np.flatnonzero(~self.clock.absent):
+            for time in (lift[leg], lift[leg] + self.swing_time):
+                place = np.where(time < lift + self.swing_time, feet.plane, ahead) - motion * time
+                stands = [k for k in AROUND if k != leg and not self.clock.absent[k]]
+                least = min(least, inside(place[stands] - torso(round(time / self.period))))
+        return least
+
+    def join(
+        self, feet: PlannedFeet, torso: Callable[[int], complex], back: int | None = None
+    ) -> PlannedFeet:
         """Begins the walk anew with feet that stand under a moving body (C55).
 
         One leg begins to give up its load: the first of those with which the farthest foot goes
-        least far.
+        least far. A leg that is back in service instead begins in the middle of its swing (C58).
         """
         clock = self.clock
         if not clock.walking:
             return self._rest(feet.plane)
         least = np.inf
         unloads, offset = clock.unloads, np.array(self.gait.offsets)
-        for first in range(LEGS):
+        if back is not None:
+            clock.start_at(0.5 + 0.5 * self.gait.duty + offset - offset[back])
+        absent = bool(clock.absent.any())
+        for first in np.flatnonzero(~clock.absent) if back is None else ():
             begin = unloads + (offset - offset[first])
-            far = self._farthest(feet, begin)
+            far = -self._steadiness(feet, begin, torso) if absent else self._farthest(feet, begin)
             if far < least - SAME_DISTANCE:
                 least = far
                 clock.start_at(begin)
-        clock.start_standing()
+        clock.start_standing(back)
         self.met = NO_LEG
         return feet
+
+    def down(self, feet: PlannedFeet) -> Mask:
+        """Returns the dropped feet (6,) that have reached the ground."""
+        dropped = self.clock.dropped & self.clock.swinging
+        return dropped & (feet.height <= self.home_height)
 
     def _landing(self, tau: Array, twist: Twist) -> Plane:
         """Returns the landing points (6,) in the walking frame [m] (C4, C53)."""
@@ -269,9 +323,10 @@ class FootPaths(Stateful):
         aim = self.narrowing * self.turned
         rolls = aim - (aim - before.rolled) * (1.0 - blend(tau)[0]) / left
         rolled = np.where(clock.swinging & ~self.met, rolls, before.rolled)
-        # a foot stays where it met the ground (C51)
-        goal = np.where(self.met, self._ground_of(before), goal)
-        pull = np.where(self.met, 0.0, pull)
+        # a foot stays where it met the ground (C51), or is dropped
+        fixed = self.met | clock.dropped
+        goal = np.where(fixed, self._ground_of(before), goal)
+        pull = np.where(fixed, 0.0, pull)
         feet = before._replace(
             phase=phase, goal=goal, pull=pull, rolled=rolled, way=way, turn=turn, twist=twist
         )

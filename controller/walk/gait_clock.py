@@ -34,11 +34,13 @@ class GaitClock(Stateful):
         offset: phases at the begin of the walk [cycles].
         late: legs that stand at the begin of the walk although the clock says that they swing, or
             that they take up their loads.
+        absent: legs out of service, which neither stand nor swing.
+        dropped: legs that end their swings at once, straight down (C58).
     """
 
     STATE = (
         "walking", "before", "swinging", "standing", "lifted", "stayed", "stays", "held", "awaited",
-        "ending", "offset", "late",
+        "ending", "offset", "late", "absent", "dropped",
     )  # fmt: skip
 
     def __init__(self, gait: Gait, *, period: float) -> None:
@@ -46,6 +48,7 @@ class GaitClock(Stateful):
         self.gait, self.period = gait, period
         self.handover = 0.0  # cycles    in which a leg takes up or gives up its load (C18)
         self.offset: Array
+        self.absent = self.dropped = NO_LEG
         self.late: Mask
         self.start_at(np.array(gait.offsets) + gait.start_clock())
         self.walking, self.before, self.held, self.ending = False, 0, False, False
@@ -64,13 +67,16 @@ class GaitClock(Stateful):
         """Stops the clock at its begin, with all legs standing."""
         self.walking, self.before, self.held, self.ending = False, 0, False, False
         self.swinging = self.standing = self.lifted = self.stays = self.awaited = NO_LEG
-        self.stayed = self.late
+        self.stayed, self.dropped = self.late, NO_LEG
 
-    def start_standing(self) -> None:
-        """Begins the walk anew with legs that all stand (C55)."""
-        self.before, self.held, self.ending = 0, False, False
+    def start_standing(self, back: int | None) -> None:
+        """Begins the walk anew with legs that all stand (C55), but for one that swings (C58)."""
+        self.before, self.held, self.ending, self.dropped = 0, False, False, NO_LEG
         self.swinging = self.lifted = self.stays = self.awaited = NO_LEG
-        self.standing, self.stayed = self.phase_after(0) < self.gait.duty, self.late
+        self.standing, self.stayed = self._stands_after(0), self.late
+        if back is not None:
+            self.swinging = np.arange(LEGS) == back
+            self.stayed = self.stayed & ~self.swinging
 
     # -------------------------------------------------------------------------------- phases
 
@@ -78,6 +84,10 @@ class GaitClock(Stateful):
         """Returns the phases (6,) `number` periods after the begin of the walk (C2)."""
         clock = self.offset + number * self.period / self.gait.period
         return np.asarray(clock - np.floor(clock))
+
+    def _stands_after(self, number: int) -> Mask:
+        """Returns the legs in service (6,) that stand by the clock after `number` periods."""
+        return np.asarray((self.phase_after(number) < self.gait.duty) & ~self.absent)
 
     def reached(self, number: int) -> int:
         """Returns the periods on the clock `number` periods after the section began (C50)."""
@@ -102,10 +112,10 @@ class GaitClock(Stateful):
         self.before = self.reached(number) if self.walking else 0
         self.held, self.awaited = False, NO_LEG
         stood = self.phase_after(self.before) < self.gait.duty
-        self.standing = self.phase_after(self.before + 1) < self.gait.duty
-        self.lifted = stood & ~self.standing
+        self.standing = self._stands_after(self.before + 1)
+        self.lifted = stood & ~self.standing & ~self.absent
         self.stayed = self.stayed | self.lifted
-        self.swinging = self.swinging & ~self.standing
+        self.swinging = self.swinging & ~self.standing & ~self.absent
         self.stays = NO_LEG
 
     def keep_down(self, kept: Mask) -> None:
@@ -115,14 +125,27 @@ class GaitClock(Stateful):
         """
         phase = self.phase_after(self.before)
         leaving = (phase >= self.unloads) & (phase < self.gait.duty) & ~kept
-        self.stays = ~self.swinging & ~leaving
+        leaving = leaving & ~self.dropped.any()
+        self.stays = (~self.swinging & ~leaving) | self.absent
         self.lifted = self.lifted & ~self.stays
+
+    def drop(self) -> None:
+        """Ends the swings at once; the walk ends with them (C58)."""
+        self.swinging = self.swinging & ~self.absent
+        self.ending, self.dropped, self.held = True, self.swinging, False
+        self.awaited = NO_LEG
+
+    def land(self, down: Mask) -> None:
+        """Lets dropped legs (6,) that are down stand."""
+        down = down & self.dropped
+        self.swinging, self.stayed = self.swinging & ~down, self.stayed | down
 
     def skip(self, home: Mask) -> bool:
         """Lets the legs skip their steps whose feet are in their stance positions (6,).
 
         Returns whether all legs stand there.
         """
+        home = home | self.absent
         self.lifted = self.lifted & ~home
         self.stays = home & ~self.swinging
         return bool(home.all() and not (self.swinging | self.lifted).any())
@@ -146,7 +169,7 @@ class GaitClock(Stateful):
 
         number: periods since the section began.
         """
-        if not self.walking:
+        if not self.walking or self.dropped.any():
             return NO_LEG
         stands = self.phase_after(self.reached(number) + 1) < self.gait.duty
         return np.asarray(self.swinging & stands)
@@ -158,7 +181,7 @@ class GaitClock(Stateful):
         """
         if not self.walking or self.held or number == 1:
             return True
-        stands = self.phase_after(self.before + number) < self.gait.duty
+        stands = self._stands_after(self.before + number)
         return bool((stands == self.standing).all())
 
     def ended(self) -> bool:

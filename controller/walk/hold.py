@@ -15,9 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.gains import HoldGains
+from hexapod_cosim.controller.gains import HoldGains, Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis, clamp
 
 LOOK_TIME = 0.04  # s    between two looks, at least a period

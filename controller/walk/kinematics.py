@@ -12,7 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.plane import Array, Mask, Plane, across, along, clamp, square
+from hexapod_cosim.controller.plane import (
+    Array,
+    Mask,
+    Plane,
+    across,
+    along,
+    cis,
+    clamp,
+    rows_of,
+    square,
+)
 from hexapod_cosim.models import LEG_NAMES, ReachError, Robot, RobotError
 
 AXES = ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (0.0, 1.0, 0.0))
@@ -203,6 +213,20 @@ class LegSolver:
             up=(femur.imag**2 + tibia.imag**2) / kp,
             splay=(femur.real * femur.imag + tibia.real * tibia.imag) / kp,
         )
+
+    def load_torques(self, angle: Array, force: Array) -> Array:
+        """Returns the joint torques (6, 3) that carry forces on the feet, -J^T f [N m] (C57).
+
+        angle: (6, 3) [rad]; force: (6, 3) on the feet's centres, torso axes [N].
+        """
+        a = angle[:, 1] + self.femur_tilt
+        b = angle[:, 1] - angle[:, 2] + self.tibia_tilt
+        tibia = self.tibia * cis(b)
+        arm = self.femur * cis(a) + tibia  # from the femur's joint to the foot
+        plane = (force[:, 0] + 1j * force[:, 1]) * cis(-(self.hip_yaw + angle[:, 0]))
+        foot = self.coxa_length + arm.real + 1j * self.offset_y
+        inner = plane.real + 1j * force[:, 2]
+        return -rows_of(across(foot, plane), across(arm, inner), -across(tibia, inner))
 
     # the design and the static checks use the following; the running controller does not
 

@@ -1,4 +1,4 @@
-"""Runs scenarios under several controls, over several seeds, for `hexapod compare`."""
+"""Runs a scenario under several controls, over several seeds, for `hexapod compare`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import Any
 
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
-    RunError,
     RunOptions,
     Words,
     check_accuracy,
@@ -27,13 +26,11 @@ from hexapod_cosim.cosim.cli.terminal import (
     counting_bar,
     show_files,
     show_json,
-    show_table,
     show_text,
     warn,
 )
 from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.report.figures import draw_figures
 from hexapod_cosim.cosim.report.tables import about, comparison_rows, with_errors
 from hexapod_cosim.cosim.report.writing import write_report
@@ -50,7 +47,6 @@ from hexapod_cosim.cosim.results.folder import (
 from hexapod_cosim.cosim.results.metric_table import has_net_slip
 from hexapod_cosim.cosim.results.side_by_side import (
     SEEDS,
-    SEEDS_PARTIAL,
     Comparisons,
     compare_all,
     write_comparison,
@@ -69,38 +65,34 @@ from hexapod_cosim.models import ScenarioError
 
 MAX_SEEDS = 10_000
 CHOSEN_WALK = (f"{CONTROLS[0]}@{CHOSEN}", f"{CHOOSER}@{CHOSEN}")
-TERRAINS = "terrains"  # folder in out/ of a comparison over several scenarios
 
 
-def compare_each(
-    names: Sequence[str], words: Words, options: RunOptions, *, output: Path | None, as_json: bool
+def compare(
+    name: str, words: Words, options: RunOptions, *, output: Path | None, as_json: bool
 ) -> int:
-    """Runs comparisons of scenarios by name and prints the results; returns the exit code.
+    """Runs the comparison of a scenario and prints the results; returns the exit code.
 
-    words: of the command line. Nothing is run unless all comparisons can be. Raises HexapodError.
+    words: of the command line. Raises HexapodError.
     """
-    works = [_work(name, words, options, alone=len(names) == 1) for name in names]
-    for work in works:
-        work.check()
-    if len(works) > 1:
-        return _compare_many(works, names, output or Path("out") / TERRAINS, as_json=as_json)
-    done = run_work(works[0], output or default_folder(names[0]))
+    work = _work(name, words, options)
+    work.check()
+    done = run_work(work, output or default_folder(name))
     if as_json:
         report = None if done.report is None else str(done.report)
         show_json({**_table(done.comparison, done.checked), "report": report})
     else:
-        _show(done, works[0].walks)
+        _show(done, work.walks)
         report = "" if done.report is None else f"report: {done.report}"
         show_text("\n".join(filter(None, (about(done.comparison), report))))
     return FELL if done.comparison.losses else SUCCESS
 
 
-def _work(name: str, words: Words, options: RunOptions, *, alone: bool) -> Work:
-    """Returns the comparison of a scenario; `alone`: no other scenario is given."""
+def _work(name: str, words: Words, options: RunOptions) -> Work:
+    """Returns the comparison of a scenario."""
     seeds = words.seeds or 0
     plan = _plan(name, words.settings, seeds)
     controls = _controls(words.controls or CONTROLS, plan)
-    alike = words.controls or words.gains or plan.names_walk or not alone
+    alike = words.controls or words.gains or plan.names_walk
     chosen = () if alike else chosen_controls(CHOSEN_WALK, plan)
     command = words.command("compare", name)
     return Work(plan, controls, chosen, seeds, command, options, words.accuracy)
@@ -209,39 +201,6 @@ def run_work(work: Work, path: Path) -> Done:
     return Done(results, comparison, checked, files, files[-1])
 
 
-def _compare_many(works: Sequence[Work], names: Sequence[str], path: Path, *, as_json: bool) -> int:
-    """Runs comparisons into folders of their own beside a table over all of them."""
-    # imported only here because matplotlib is slow to import
-    from hexapod_cosim.cosim.report import terrains
-
-    rows: list[terrains.Row] = []
-    reports: list[Path] = []
-    lost = False
-    for work, name in zip(works, names, strict=True):
-        place = Path(name).stem
-        try:
-            done = run_work(work, path / place)
-        except RunError as error:
-            warn(f"{place}: {error}")
-            lost = True
-            continue
-        rows += terrains.terrain_rows(place, done.comparison)
-        reports += [] if done.report is None else [done.report]
-        lost = lost or bool(done.comparison.losses)
-    files = terrains.write_terrains(rows, path) if rows else []
-    if as_json:
-        show_json(
-            {"rows": terrains.rows_as_table(rows), "reports": [str(report) for report in reports]}
-        )
-        return FELL if lost else SUCCESS
-    columns = terrains.table_columns(rows)
-    show_table(list(columns), zip(*columns.values(), strict=True), right=range(2, len(columns)))
-    show_files(files)
-    if reports:
-        show_text("\n".join(f"report: {report}" for report in reports))
-    return FELL if lost else SUCCESS
-
-
 def _show(done: Done, walks: Sequence[str]) -> None:
     """Prints the metrics of all controls, their accuracy if it was checked, walks and files."""
     comparison, checked = done.comparison, done.checked
@@ -302,7 +261,7 @@ def _first_seed(work: Work, folder: ResultsFolder) -> tuple[dict[str, Result], l
 
 
 def _all_seeds(work: Work, results: Mapping[str, Result], folder: Path) -> Comparisons:
-    """Runs the other seeds; an interrupt or error keeps the completed runs in SEEDS_PARTIAL."""
+    """Runs the other seeds and compares all runs."""
     plan, options, count = work.plan, work.options, len(work.compared)
     scenarios = [
         replace(plan, control=control.text, seed=seed)
@@ -310,19 +269,13 @@ def _all_seeds(work: Work, results: Mapping[str, Result], folder: Path) -> Compa
         for control in (work.compared if seed > plan.seed else work.chosen)
     ]
     done: list[Summary] = [summarise(results[label]) for label in work.labels]
-    try:
-        compiled = options.engine == "compiled"
-        batch = run_batch(scenarios, fmu=options.fmu, gains=options.gains, compiled=compiled)
-        with counting_bar("seeds", count * work.seeds) as report_count, closing(batch) as runs:
+    compiled = options.engine == "compiled"
+    batch = run_batch(scenarios, fmu=options.fmu, gains=options.gains, compiled=compiled)
+    with counting_bar("seeds", count * work.seeds) as report_count, closing(batch) as runs:
+        report_count(len(done))
+        for run in runs:
+            done.append(run)
             report_count(len(done))
-            for run in runs:
-                done.append(run)
-                report_count(len(done))
-    except BaseException:
-        with deferred_interrupts():
-            write_seeds(folder / SEEDS_PARTIAL, done)
-            warn(f"the completed runs are in {folder / SEEDS_PARTIAL}")
-        raise
     write_seeds(folder / SEEDS, done)
     labels = [control.label for control in work.compared]
     comparison = compare_all(

@@ -1,4 +1,4 @@
-"""The commands of the command line: how they are declared, and what the extensions add.
+"""What extensions add to the command line, the build, releases and the site of the documentation.
 
 Commands are declared by name and place, so that `hexapod --help` and the completion of names import
 none of them. An extension is a folder of extensions/, or another package, with an entry point in
@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module, metadata
+from pathlib import Path
 from typing import Any
 
 GROUP = "hexapod.commands"
@@ -31,12 +32,18 @@ class Command:
 
 @dataclass(frozen=True, kw_only=True)
 class Extension:
-    """The parts of the command line that an extension defines; functions by "module:function"."""
+    """The parts that an extension adds; functions are named by "module:function"."""
 
     commands: Sequence[Command]
     # kind in run.json -> function of the folder that writes its report again and returns the files
     reports: Mapping[str, str] = field(default_factory=dict)
     lists: Mapping[str, str] = field(default_factory=dict)  # functions of `hexapod list` -> Rows
+    # functions that return the Interface of an FMU for the default robot, for the build
+    interfaces: Sequence[str] = ()
+    # file in the wheel's hexapod_cosim/plant -> function that returns its bytes, for a release
+    release: Mapping[str, str] = field(default_factory=dict)
+    # file in the documentation's site -> function that writes it to a path
+    site: Mapping[str, str] = field(default_factory=dict)
 
 
 def loaded(place: str) -> Any:
@@ -67,6 +74,12 @@ def _extension(entry: metadata.EntryPoint) -> Extension | None:
     if not isinstance(extension, Extension):
         raise TypeError(f"entry point {entry.name} of {GROUP}: got {extension!r}, not an Extension")
     return extension
+
+
+def extensions_in(tree: Path) -> list[Extension]:
+    """Returns the extensions of a source tree, whether or not they are installed."""
+    names = sorted(path.parent.name for path in tree.glob("extensions/*/extension.py"))
+    return [loaded(f"hexapod_cosim.extensions.{name}.extension:EXTENSION") for name in names]
 
 
 def report_functions() -> dict[str, str]:

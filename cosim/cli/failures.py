@@ -40,7 +40,6 @@ SETTINGS = {
     "--mu": "friction.mu=0.4",
     "--vx": "command.vx=0.12",
 }
-OF_SCENARIOS = ("simulate", "compare", "live", "benchmark")  # commands whose --set takes them
 
 
 def report_failure(
@@ -89,6 +88,7 @@ def usage_parts(error: Any) -> tuple[str, str, str]:
     path, fix = context.command_path, f"`{context.command_path} --help` explains it"
     usage = " ".join([path, *context.command.collect_usage_pieces(context)])
     setting = SETTINGS.get(getattr(error, "option_name", "").replace("_", "-"))
-    if setting and path.split()[-1] in OF_SCENARIOS:
+    helps = " ".join(getattr(one, "help", None) or "" for one in context.command.params)
+    if setting and "a key of the scenario" in helps:
         fix = f"write --set {setting}; {fix}"
     return message, usage, fix

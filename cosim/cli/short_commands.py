@@ -25,12 +25,12 @@ def report(
     folder: Annotated[
         Path,
         typer.Argument(
-            metavar="DIR", help="A folder written by `hexapod simulate`, `compare` or `study`."
+            metavar="DIR", help="A folder that a command of `hexapod` wrote, such as compare."
         ),
     ],
     json: Json = False,
 ) -> None:
-    """Make a report again, of a run, comparison, study or benchmark, with figures as PNG too."""
+    """Make the report of a folder of results again, with figures as PNG too."""
     from hexapod_cosim.cosim.report.writing import REPORT
     from hexapod_cosim.cosim.results.folder import damage_reported, read_facts
 
@@ -55,11 +55,16 @@ def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     if kind == "compare":
         return _report_comparison(folder, facts)
     if kind not in ("simulate", None):  # None: a run that has not ended
+        from hexapod_cosim.cosim.cli.app import all_commands
+
+        fix = f"run it again: {facts.get('command', '')}"
+        if kind not in {command.name for command in all_commands()}:
+            fix = f"install the extension with the command {kind}"
         raise HexapodError(
-            "not a run, whose report can be made again",
+            "no installed command writes this report again",
             got=f"a folder of `hexapod {kind}`",
-            expected=", ".join(["simulate", "compare", *reports]),
-            fix=f"run it again: {facts.get('command', '')}",
+            expected=f"one of {', '.join(['simulate', 'compare', *reports])}",
+            fix=fix,
             where=str(folder),
         )
     run = read_result(folder)

@@ -19,8 +19,7 @@ from hexapod_cosim.models.files import read_text
 
 RUN_FILE = "run.json"  # marks a folder as written by this package
 RUNNING = "running"
-BENCHMARK = "benchmark"  # the kind of a folder that holds the result of a benchmark
-STUDY = "study"  # the kind of a folder that holds a study, which can be resumed
+RESUMABLE = "resumable"  # key of run.json: the folder is not cleared, since its runs go on
 RESULT_FILES = (
     "results.parquet",
     "results.csv",
@@ -29,20 +28,12 @@ RESULT_FILES = (
     "results.partial.parquet",
     "results.partial.csv",
     "results.partial.mcap",
-    "replay.csv",
-    "robot.toml",
-    "sensors.toml",
-    "identify.json",
     "seeds.csv",
-    "seeds.partial.csv",
     "metrics.json",
     "scenario.toml",
     "ground.terrain",
     "report.html",
     "plots",
-    "benchmark.json",
-    "runs.csv",
-    "tables.md",
 )
 RESERVED_NAMES = frozenset((*RESULT_FILES, RUN_FILE))  # no folder of a control has such a name
 PARTS = "controls"  # key of run.json: labels of a comparison, whose runs have folders of their own
@@ -197,9 +188,9 @@ def claim_folder(folder: Path) -> list[Path]:
             pass
     except OSError as error:
         raise not_writable(folder, error) from error
-    if RUN_FILE in entries and read_json(folder / RUN_FILE).get("kind") == STUDY:
+    if RUN_FILE in entries and read_json(folder / RUN_FILE).get(RESUMABLE):
         raise HexapodError(
-            "the folder holds a study",
+            "the folder holds runs that can be resumed",
             got=str(folder),
             expected="a folder of its own",
             fix="choose another with -o",
@@ -216,15 +207,17 @@ def claim_folder(folder: Path) -> list[Path]:
     return made
 
 
-def clear_folder(folder: Path, parts: Sequence[str] = ()) -> None:
+def clear_folder(
+    folder: Path, parts: Sequence[str] = (), files: Sequence[str] = RESULT_FILES
+) -> None:
     """Deletes an earlier run's files from a claimed folder and marks it as a running run's.
 
-    `parts`: names of the folders in it that the new run will write. Raises HexapodError when the
-    folder cannot be written.
+    `parts`: names of the folders in it that the new run will write; `files`: those to delete.
+    Raises HexapodError when the folder cannot be written.
     """
     try:
         folder.mkdir(exist_ok=True)
-        for name in (*RESULT_FILES, *_earlier_parts(folder)):
+        for name in (*files, *_earlier_parts(folder)):
             _remove(folder / name)
         write_json(folder / RUN_FILE, {"status": RUNNING} | ({PARTS: list(parts)} if parts else {}))
     except OSError as error:
@@ -258,7 +251,7 @@ def read_json(path: Path) -> Any:
             "not a results folder",
             got=str(path.parent),
             expected=f"a folder with {path.name}",
-            fix="give a folder written by `hexapod simulate`, `hexapod compare` or `hexapod study`",
+            fix="give a folder that a command of `hexapod` wrote, such as simulate or compare",
         ) from error
     except OSError as error:
         raise not_writable(path, error) from error

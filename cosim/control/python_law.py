@@ -209,10 +209,10 @@ def users_errors(path: Path | None) -> Iterator[None]:
     except ControllerError:
         raise
     except (Exception, SystemExit) as error:
-        raise _told(error, path) from error
+        raise _explained(error, path) from error
 
 
-def _told(error: Exception | SystemExit, path: Path | None) -> ControllerError:
+def _explained(error: Exception | SystemExit, path: Path | None) -> ControllerError:
     """Returns the error of a user's code as one sentence: where it arose, what it is, the line."""
     text = " ".join(str(error).split())
     if isinstance(error, SyntaxError) and error.filename:

@@ -84,7 +84,7 @@ def examine_stances(
 def _check_can_design(robot: Robot, period: float) -> None:
     """Raises GainsError for an impossible period and for feet without friction."""
     check_period(period)
-    if robot.friction.law == "none" or robot.friction.mu == 0.0:
+    if not robot.friction.has_friction or robot.friction.mu == 0.0:
         raise GainsError(
             "compliant control answers to the feet's friction",
             got=f"friction law {robot.friction.law}, mu {robot.friction.mu}",

@@ -63,18 +63,6 @@ TARGETS = {
     "aarch64-darwin": Target("aarch64-macos.11.0", ".dylib"),
 }
 
-# a module for browsers, which no importer of FMUs loads; all of them have vectors since 2021 or
-# 2023 (Safari)
-BROWSER = "wasm32-wasi"
-WEB_ASSEMBLY = Target(
-    BROWSER,
-    ".wasm",
-    ("-Wl,--export-dynamic", "-Wl,--strip-all", "-Wl,-z,stack-size=1048576"),
-    "generic+simd128+bulk_memory+nontrapping_fptoint",
-    ("-mexec-model=reactor",),
-)
-ALL_TARGETS = {**TARGETS, BROWSER: WEB_ASSEMBLY}
-
 
 @dataclass(frozen=True)
 class Library:
@@ -128,7 +116,7 @@ def find_compiler() -> Compiler:
 
 def build_library(
     library: Library,
-    target: str,
+    target: str | Target,
     *,
     compiler: Compiler | None = None,
     cache_folder: Path | None = None,
@@ -137,19 +125,20 @@ def build_library(
 
     Args:
         library: the library to build.
-        target: a key of ALL_TARGETS.
+        target: a key of TARGETS, or another target of the compiler.
         compiler: the installed one by default.
         cache_folder: the user's by default; processes may share it.
 
     Raises FmuError without a compiler, and for sources that do not compile.
     """
     compiler, folder = compiler or find_compiler(), cache_folder or user_cache()
-    flags = (*_flags(library, target), *library.flags)
+    chosen = TARGETS[target] if isinstance(target, str) else target
+    flags = (*_flags(library, chosen), *library.flags)
     key = _digest([library.digest(), compiler.version, *flags])
-    kept = folder / "binaries" / f"{library.name}-{target}-{key[:32]}{ALL_TARGETS[target].suffix}"
+    kept = folder / "binaries" / f"{library.name}-{chosen.triple}-{key[:32]}{chosen.suffix}"
     if kept.is_file():
         return kept.read_bytes()
-    data = _compile(library, [*compiler.command, *flags], target, folder)
+    data = _compile(library, [*compiler.command, *flags], chosen, folder)
     _keep(kept, data)
     return data
 
@@ -159,22 +148,21 @@ def user_cache() -> Path:
     return Path(platformdirs.user_cache_path(APPLICATION, appauthor=False))
 
 
-def _flags(library: Library, target: str) -> tuple[str, ...]:
+def _flags(library: Library, target: Target) -> tuple[str, ...]:
     """Returns the flags of compiler and linker for a target."""
-    chosen = ALL_TARGETS[target]
     link = (
-        (f"-Wl,-install_name,@rpath/{library.name}{chosen.suffix}",)
-        if chosen.suffix == ".dylib"
-        else chosen.link
+        (f"-Wl,-install_name,@rpath/{library.name}{target.suffix}",)
+        if target.suffix == ".dylib"
+        else target.link
     )
-    processor = f"-mcpu={chosen.processor}"
-    return ("-target", chosen.triple, processor, *COMPILE, *chosen.shared, *link)
+    processor = f"-mcpu={target.processor}"
+    return ("-target", target.triple, processor, *COMPILE, *target.shared, *link)
 
 
-def _compile(library: Library, command: Sequence[str], target: str, cache_folder: Path) -> bytes:
+def _compile(library: Library, command: Sequence[str], target: Target, cache_folder: Path) -> bytes:
     """Copies the sources into a folder, compiles them there and returns the library's bytes."""
     with TemporaryFolder("build") as name:
-        root, out = name, library.name + ALL_TARGETS[target].suffix
+        root, out = name, library.name + target.suffix
         for path, source in library.sources.items():
             (root / "in" / path).parent.mkdir(parents=True, exist_ok=True)
             (root / "in" / path).write_bytes(source.read_bytes())
@@ -196,7 +184,7 @@ def _compile(library: Library, command: Sequence[str], target: str, cache_folder
         return (root / "out" / out).read_bytes()
 
 
-def _run(command: Sequence[str], root: Path, target: str, cache_folder: Path) -> None:
+def _run(command: Sequence[str], root: Path, target: Target, cache_folder: Path) -> None:
     """Runs the compiler. Raises FmuError when it fails or exceeds TIMEOUT."""
     environment = compiler_environment(root, cache_folder)
     try:
@@ -213,7 +201,7 @@ def _run(command: Sequence[str], root: Path, target: str, cache_folder: Path) ->
     except subprocess.TimeoutExpired as error:
         fix = "run it again: what is done so far is kept"
         raise FmuError(
-            f"cannot build for {target}",
+            f"cannot build for {target.triple}",
             got="a compiler that hangs",
             expected=f"an end within {TIMEOUT} s",
             fix=fix,
@@ -225,7 +213,10 @@ def _run(command: Sequence[str], root: Path, target: str, cache_folder: Path) ->
         )
         fix = "correct the sources, or reinstall the compiler if it is damaged"
         raise FmuError(
-            f"cannot build for {target}", got=messages, expected="sources that compile", fix=fix
+            f"cannot build for {target.triple}",
+            got=messages,
+            expected="sources that compile",
+            fix=fix,
         )
 
 

@@ -40,12 +40,12 @@ from hexapod_cosim.cosim.interface.controller import (
 )
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.interface.model_description3 import render_build_description, render_fmi3
-from hexapod_cosim.cosim.interface.plant import Interface, load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.cosim.interface.terminals import (
     FOLDER,
     ICON,
     render_terminals,
-    render_terminals3,
 )
 from hexapod_cosim.models.errors import FmuError
 from hexapod_cosim.models.ground.faces import surface_of
@@ -264,16 +264,16 @@ def extra_members(
         fmi: version of the standard.
         reference: whether the archive contains reference results.
     """
-    ports = [
-        array.name for array in arrays(interface) if array.first.causality in ("input", "output")
-    ]
-    terminals = render_terminals(list(interface.by_name)) if fmi == 2 else render_terminals3(ports)
+    ports = list(interface.by_name)
+    if fmi == 3:
+        seen = ("input", "output")
+        ports = [one.name for one in arrays(interface) if one.first.causality in seen]
     return {
         "documentation/index.html": render_html(
             interface, description, picture=PICTURES[fmi], reference=reference
         ).encode(),
         LICENCE: licence_file().read_bytes(),
-        f"{FOLDER}/terminalsAndIcons.xml": terminals.encode(),
+        f"{FOLDER}/terminalsAndIcons.xml": render_terminals(ports).encode(),
         **pictures(interface, fmi=fmi),
     }
 

@@ -14,7 +14,7 @@ import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from hexapod_cosim.cosim.interface.plant import Interface
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.cosim.master.fmu import Fmu
 
 STANDARD, STANDARD_VERSION = "org.fmi-standard.fmi-ls-ref", "1.0.0-alpha.1"

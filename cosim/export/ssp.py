@@ -2,12 +2,13 @@
 SSP 2.0 for those of FMI 3.0, whose arrays are connected as a whole.
 
 An output of one component is connected to the input of the other that has the same name, type and
-dimensions. A package has no parameter sets: all values are the FMUs' start values.
+dimensions. A package has no parameter sets: all values are the FMUs' start values. Inputs that no
+output drives have no connectors, because masters set those to 0, and keep their start values.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -172,11 +173,13 @@ def structure(
         name="root",
         description=f"{title}: " + ", ".join(one.name for one in components),
     )
-    elements = SubElement(system, "ssd:Elements")
+    elements, driven = SubElement(system, "ssd:Elements"), list(connections)
     for component in components:
-        _add_component(elements, component)
+        _add_component(
+            elements, component, {one.name for one in driven if one.end == component.name}
+        )
     parent = SubElement(system, "ssd:Connections")
-    for one in connections:
+    for one in driven:
         ends = {
             "startElement": one.start,
             "startConnector": one.name,
@@ -189,8 +192,8 @@ def structure(
     return root
 
 
-def _add_component(parent: Element, component: Component) -> None:
-    """Adds a component with its connectors."""
+def _add_component(parent: Element, component: Component, driven: Container[str]) -> None:
+    """Adds a component with its connectors, of inputs only those that are driven."""
     facts = {
         "name": component.name,
         "type": "application/x-fmu-sharedlibrary",
@@ -199,6 +202,8 @@ def _add_component(parent: Element, component: Component) -> None:
     element = SubElement(parent, "ssd:Component", facts | {"implementation": "CoSimulation"})
     connectors = SubElement(element, "ssd:Connectors")
     for variable in component.variables.values():
+        if variable.causality == "input" and variable.name not in driven:
+            continue
         connector = SubElement(
             connectors, "ssd:Connector", {"name": variable.name, "kind": variable.causality}
         )

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from functools import reduce
 
-from hexapod_cosim.cosim.interface.plant import Causality, Interface, Variable
+from hexapod_cosim.cosim.interface.records import Causality, Interface, Variable
 from hexapod_cosim.models.errors import FmuError, nearest_name
 
 FNV_BASIS, FNV_PRIME, MASK, WORD = 0xCBF29CE484222325, 0x100000001B3, (1 << 64) - 1, 8

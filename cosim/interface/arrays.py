@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 from hexapod_cosim.cosim.interface.patterns import plain_name
-from hexapod_cosim.cosim.interface.plant import CAUSALITIES, Interface, Pattern, Variable
+from hexapod_cosim.cosim.interface.records import CAUSALITIES, Interface, Pattern, Variable
 from hexapod_cosim.models.errors import HexapodError
 
 

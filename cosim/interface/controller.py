@@ -10,11 +10,10 @@ from types import SimpleNamespace
 
 from hexapod_cosim.controller import Controller, Gains, Gait, Parts
 from hexapod_cosim.controller.controller import gains_warnings
-from hexapod_cosim.controller.gains import HoldGains, SupportGains
-from hexapod_cosim.controller.size import limit_gains, paper_gains, requirements_for, taken
+from hexapod_cosim.controller.size import requirements_for, sections_for
 from hexapod_cosim.cosim.common.components import CONTROLLER
-from hexapod_cosim.cosim.interface.plant import Interface, expand_interface
-from hexapod_cosim.cosim.interface.start_values import parameter_values
+from hexapod_cosim.cosim.interface.plant import expand_interface, parameter_values
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.models import Robot
 
 ALL_PARTS = Parts()
@@ -94,10 +93,4 @@ def passive_gains(robot: Robot) -> SimpleNamespace:
 
     They follow from the requirements.
     """
-    needs = requirements_for(robot)
-    return SimpleNamespace(
-        support=taken(SupportGains, needs),
-        hold=taken(HoldGains, needs),
-        limits=limit_gains(robot, needs),
-        paper=paper_gains(robot, needs),
-    )
+    return SimpleNamespace(**sections_for(robot, requirements_for(robot)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import uuid
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from hexapod_cosim.cosim.common.components import Component
 from hexapod_cosim.cosim.common.plant_files import DISTRIBUTION, FMI3_SOURCES, source_files
-from hexapod_cosim.cosim.interface.plant import Enumeration, Interface, Unit, Variable
+from hexapod_cosim.cosim.interface.records import Enumeration, Interface, Unit, Variable
 
 # capabilities, each tested by tests/fmi/test_fmi.py or in tests/exchange
 BOTH = {
@@ -22,11 +23,8 @@ BOTH = {
     "canSerializeFMUstate": "true",
 }
 MODEL_EXCHANGE = {"completedIntegratorStepNotNeeded": "false"} | BOTH
-# canInterpolateInputs is false although the FMU accepts derivatives of inputs: some masters refuse
-# an FMU that declares it when their sources have no derivatives
 CO_SIMULATION = {
     "canHandleVariableCommunicationStepSize": "true",
-    "canInterpolateInputs": "false",
     "canRunAsynchronuously": "false",
 } | BOTH
 
@@ -65,7 +63,7 @@ def _document(interface: Interface) -> Element:
     root = Element("fmiModelDescription", own | general_facts(interface))
     _add_interfaces(root, interface)
     add_units(root, interface.units)
-    _add_types(root, interface.enumerations.values(), interface.units)
+    _add_types(root, interface)
     add_log_categories(root, interface)
     add_experiment(root, interface)
     add_provenance(SubElement(root, "VendorAnnotations"), "Tool", {"name": DISTRIBUTION}, interface)
@@ -80,7 +78,10 @@ def _add_interfaces(root: Element, interface: Interface) -> None:
     """Adds CoSimulation and, for components with continuous states, ModelExchange."""
     differentiable = bool(interface.states) and interface.directional_derivatives
     derivatives = {"providesDirectionalDerivative": _flag(differentiable)}
-    order = {"maxOutputDerivativeOrder": str(int(bool(interface.states)))}
+    order = {
+        "maxOutputDerivativeOrder": str(int(bool(interface.states))),
+        "canInterpolateInputs": _flag(bool(interface.states)),
+    }
     identifier = {"modelIdentifier": interface.component.identifier}
     if interface.states:
         _add_sources(
@@ -113,6 +114,8 @@ def general_facts(interface: Interface) -> dict[str, str]:
     return {
         "modelName": robot.name + interface.component.suffix,
         "version": interface.version,
+        "author": f"{DISTRIBUTION} developers",
+        "copyright": f"Copyright (c) the {DISTRIBUTION} developers",
         "license": "MIT",
         "description": interface.component.description.format(bodies=1 + joints, joints=joints),
         "generationTool": f"{DISTRIBUTION} {interface.version}",
@@ -142,15 +145,29 @@ def add_units(root: Element, units: Iterable[Unit]) -> None:
             SubElement(element, "DisplayUnit", name=unit.display[0], factor=repr(unit.display[1]))
 
 
-def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterable[Unit]) -> None:
-    """Adds the types of units and enumerations."""
-    parent = SubElement(root, "TypeDefinitions")
-    for unit in units:
+def _add_types(root: Element, interface: Interface) -> None:
+    """Adds the types of units and enumerations, if there are any: the list must not be empty."""
+    parent = Element("TypeDefinitions")
+    for unit in interface.units:
         _add_real_type(parent, unit)
-    for enumeration in enumerations:
-        element = SubElement(SubElement(parent, "SimpleType", name=enumeration.name), "Enumeration")
+    for enumeration in interface.enumerations.values():
+        facts = {"name": enumeration.name, "description": about_type(enumeration, interface)}
+        element = SubElement(SubElement(parent, "SimpleType", facts), "Enumeration")
         for number, (name, text) in enumerate(enumeration.items, start=1):
             SubElement(element, "Item", name=name, value=str(number), description=text)
+    root.extend([parent] if len(parent) else [])
+
+
+def about_unit(unit: Unit) -> str:
+    """Returns the description of a unit's type."""
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", unit.type or "")
+    return f"{words.capitalize()} in {unit.name}"
+
+
+def about_type(enumeration: Enumeration, interface: Interface) -> str:
+    """Returns the description of an enumeration: that of its first variable."""
+    own = (one for one in interface.variables if one.enumeration == enumeration.name)
+    return next((one.description for one in own), enumeration.name)
 
 
 def _add_real_type(parent: Element, unit: Unit) -> None:
@@ -158,7 +175,7 @@ def _add_real_type(parent: Element, unit: Unit) -> None:
     if unit.type is not None:
         display = {"displayUnit": unit.display[0]} if unit.display else {}
         SubElement(
-            SubElement(parent, "SimpleType", name=unit.type),
+            SubElement(parent, "SimpleType", name=unit.type, description=about_unit(unit)),
             "Real",
             {"quantity": unit.type, "unit": unit.name} | display,
         )

@@ -14,6 +14,8 @@ from hexapod_cosim.cosim.common.plant_files import DISTRIBUTION
 from hexapod_cosim.cosim.interface.arrays import Array, arrays
 from hexapod_cosim.cosim.interface.model_description import (
     ModelDescription,
+    about_type,
+    about_unit,
     add_experiment,
     add_log_categories,
     add_provenance,
@@ -24,7 +26,7 @@ from hexapod_cosim.cosim.interface.model_description import (
     stated,
     typed_attributes,
 )
-from hexapod_cosim.cosim.interface.plant import Enumeration, Interface, Unit
+from hexapod_cosim.cosim.interface.records import Interface
 
 # capabilities, each tested by tests/fmi/test_fmi3.py
 CAPABILITIES = {
@@ -65,7 +67,7 @@ def render_fmi3(interface: Interface) -> ModelDescription:
     )
     _add_interfaces(root, interface)
     add_units(root, interface.units)
-    _add_types(root, interface.enumerations.values(), interface.units)
+    _add_types(root, interface)
     add_log_categories(root, interface)
     add_experiment(root, interface)
     _add_variables(root, interface, variables)
@@ -113,21 +115,25 @@ def _add_interfaces(root: Element, interface: Interface) -> None:
     )
 
 
-def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterable[Unit]) -> None:
+def _add_types(root: Element, interface: Interface) -> None:
     """Adds the types of enumerations and units."""
-    parent = SubElement(root, "TypeDefinitions")
-    for enumeration in enumerations:
-        element = SubElement(parent, "EnumerationType", name=enumeration.name)
+    parent = Element("TypeDefinitions")
+    for enumeration in interface.enumerations.values():
+        facts = {"name": enumeration.name, "description": about_type(enumeration, interface)}
+        element = SubElement(parent, "EnumerationType", facts)
         for number, (name, text) in enumerate(enumeration.items, start=1):
             SubElement(element, "Item", name=name, value=str(number), description=text)
-    for unit in units:
+    for unit in interface.units:
         if unit.type is not None:
             display = {"displayUnit": unit.display[0]} if unit.display else {}
             SubElement(
                 parent,
                 "Float64Type",
-                {"name": unit.type, "quantity": unit.type, "unit": unit.name} | display,
+                {"name": unit.type, "description": about_unit(unit)}
+                | {"quantity": unit.type, "unit": unit.name}
+                | display,
             )
+    root.extend([parent] if len(parent) else [])
 
 
 def _add_variables(root: Element, interface: Interface, variables: Iterable[Array]) -> None:

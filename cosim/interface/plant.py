@@ -11,11 +11,12 @@ import math
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
 from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Any
 
+from hexapod_cosim.controller.signals import DEFAULT_PERIOD
 from hexapod_cosim.cosim.common.components import PLANT, Component
 from hexapod_cosim.cosim.common.plant_files import interface_file, package_version
 from hexapod_cosim.cosim.interface.patterns import (
@@ -25,16 +26,23 @@ from hexapod_cosim.cosim.interface.patterns import (
     own_axes,
     with_defaults,
 )
-from hexapod_cosim.models.errors import HexapodError, unknown_name
+from hexapod_cosim.cosim.interface.records import (
+    CAUSALITIES,
+    Causality,
+    Enumeration,
+    Interface,
+    Pattern,
+    State,
+    Type,
+    Unit,
+    Variable,
+)
+from hexapod_cosim.models.errors import HexapodError
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.statics import settled
 
-Causality = Literal["input", "output", "parameter", "local"]
-Type = Literal["Real", "Boolean", "Enumeration", "Integer"]
-
 Step = str | int  # of a path to a start value: an attribute's name or an index of a sequence
 
-CAUSALITIES: tuple[Causality, ...] = ("input", "output", "parameter", "local")
 DEFAULT_VARIABILITY = {
     "input": "continuous",
     "output": "continuous",
@@ -43,170 +51,6 @@ DEFAULT_VARIABILITY = {
 }
 # of the settled pose [m, rad]: rounds off differences between machines
 POSE_DECIMALS = 10
-
-
-@dataclass(frozen=True, kw_only=True)
-class Unit:
-    """A unit and its display unit.
-
-    exponents: of the SI base units; None where they are no integers, as FMI requires.
-    display: name of the display unit and factor: display value = factor * value.
-    type: the type that variables of this unit declare.
-    """
-
-    name: str
-    exponents: Mapping[str, int] | None
-    display: tuple[str, float] | None
-    type: str | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Enumeration:
-    """An enumeration type.
-
-    Item k of `items` (name, description) has the number k + 1 and the C constant {prefix}_{NAME}.
-    """
-
-    name: str
-    prefix: str
-    items: tuple[tuple[str, str], ...]
-
-    def number(self, item: str) -> int:
-        """Returns the number of an item. Raises HexapodError for an unknown one."""
-        names = [name for name, _ in self.items]
-        if item not in names:
-            raise unknown_name(self.name, item, names)
-        return names.index(item) + 1
-
-    def constant(self, number: int) -> str:
-        """Returns the C constant of a number."""
-        return f"{self.prefix}_{self.items[number - 1][0]}".upper()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Variable:
-    """One scalar variable of the FMU.
-
-    depends: states and inputs that an output or local variable is a direct function of; None: all.
-    initial: parameters that its initial value depends on, besides those of its states; None: all.
-    group: of the outputs that are computed together; None: all.
-    """
-
-    name: str
-    reference: int
-    type: Type
-    causality: Causality
-    variability: str
-    unit: str | None  # of a Real
-    minimum: float | None
-    maximum: float | None
-    nominal: float | None
-    start: float | int | None  # None for outputs
-    enumeration: str | None
-    field: str  # lvalue in struct hxVariables
-    depends: tuple[str, ...] | None
-    initial: tuple[str, ...] | None
-    group: str | None
-    description: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class State:
-    """A continuous state of model exchange, its derivative and the parameters that its initial
-    value depends on, by the names of their variables.
-    """
-
-    name: str
-    derivative: str
-    initial: tuple[str, ...]
-    reinit: bool  # whether an event may set it
-
-
-@dataclass(frozen=True, kw_only=True)
-class Pattern:
-    """One entry of interface.toml, which stands for one variable or for several.
-
-    axes: the axes in the name, each with its labels; in the order of the variables the first axis
-    runs slowest.
-    """
-
-    name: str
-    axes: tuple[tuple[str, tuple[str, ...]], ...]
-    causality: Causality
-    kind: str  # unit or type
-    description: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Interface:
-    """The content of one FMU's model description."""
-
-    component: Component
-    robot: Robot
-    version: str
-    variables: tuple[Variable, ...]
-    states: tuple[State, ...]  # in the order in which importers exchange them
-    event_indicators: int
-    indicator_patterns: tuple[str, ...]  # those whose variables are the event indicators
-    patterns: tuple[Pattern, ...]
-    units: tuple[Unit, ...]
-    enumerations: Mapping[str, Enumeration]
-    log_categories: Mapping[str, str]
-    first_reference: Mapping[str, int]
-    stop_time: float  # s
-    step: float  # s
-    directional_derivatives: bool = True  # of components with states: the binary has them
-
-    @cached_property
-    def by_name(self) -> Mapping[str, Variable]:
-        """The variables by name."""
-        return {variable.name: variable for variable in self.variables}
-
-    @cached_property
-    def index(self) -> Mapping[str, int]:
-        """Indices of variables in the model description, from 1, by name."""
-        return {variable.name: place for place, variable in enumerate(self.variables, start=1)}
-
-    @cached_property
-    def derivative_of(self) -> Mapping[str, int]:
-        """Indices of states by the names of their derivatives."""
-        return {state.derivative: self.index[state.name] for state in self.states}
-
-    @cached_property
-    def reinitialised(self) -> frozenset[str]:
-        """Names of the states that an event may set."""
-        return frozenset(state.name for state in self.states if state.reinit)
-
-    def depends(self, name: str) -> tuple[str, ...] | None:
-        """Returns the states and inputs that an output or derivative is a direct function of.
-
-        None: all.
-        """
-        return self.variable(name).depends
-
-    def depends_initially(self, name: str) -> tuple[str, ...] | None:
-        """Returns the parameters and inputs that an initial value depends on; None: all."""
-        variable, start = self.variable(name), {state.name: state.initial for state in self.states}
-        if name in start:
-            return start[name]
-        if variable.depends is None or variable.initial is None:
-            return None
-        through = [known for state in variable.depends for known in start.get(state, (state,))]
-        return tuple(dict.fromkeys([*through, *variable.initial]))
-
-    def variable(self, name: str) -> Variable:
-        """Returns a variable by name. Raises HexapodError, which suggests the nearest name."""
-        if name not in self.by_name:
-            raise unknown_name("FMU variable", name, self.by_name)
-        return self.by_name[name]
-
-    def references(self, names: Iterable[str]) -> list[int]:
-        """Returns value references in the order of the names. Raises HexapodError."""
-        return [self.variable(name).reference for name in names]
-
-    def of_causality(self, *causalities: Causality) -> list[Variable]:
-        """Returns the variables of these causalities in the order of their references."""
-        return [variable for variable in self.variables if variable.causality in causalities]
 
 
 @lru_cache(maxsize=16)
@@ -224,8 +68,12 @@ def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace)
     Raises HexapodError when one is out of its variable's range.
     """
     table = read_table(component)
-    enumerations = enumerations_of(component)
-    variables = tuple(_expand_all(table, enumerations, roots))
+    variables = tuple(
+        replace(one.variable, start=one.start(roots)) if one.path else one.variable
+        for one in _templates(component)
+    )
+    for variable in variables:
+        _check_start(variable)
     return Interface(
         component=component,
         robot=robot,
@@ -240,12 +88,25 @@ def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace)
             for entry in table.get(causality, [])
         ),
         units=tuple(_unit(name, entry) for name, entry in table["unit"].items()),
-        enumerations=enumerations,
+        enumerations=enumerations_of(component),
         log_categories=table["log_category"],
         first_reference=table["first_reference"],
         stop_time=table["experiment"]["stop"],
-        step=table["experiment"]["step"],
+        step=table["experiment"].get("step", DEFAULT_PERIOD),
     )
+
+
+def parameter_values(component: Component, roots: SimpleNamespace) -> dict[str, float]:
+    """Returns the start values of parameters by name, as `expand_interface` does.
+
+    Their ranges are not checked: the FMU does.
+    """
+    values = {
+        one.variable.name: one.start(roots)
+        for one in _templates(component)
+        if one.variable.causality == "parameter"
+    }
+    return {name: value for name, value in values.items() if value is not None}
 
 
 @cache
@@ -254,6 +115,12 @@ def read_table(component: Component) -> dict[str, Any]:
     table = tomllib.loads(interface_file(component).read_text(encoding="utf-8"))
     for causality in CAUSALITIES:
         entries = table.get(causality, [])
+        if any("record" in entry for entry in entries):
+            from hexapod_cosim.cosim.interface.gain_rows import (  # noqa: PLC0415  slow to import
+                rows_of_records,
+            )
+
+            entries = rows_of_records(entries)
         table[causality] = [with_defaults(entry, causality, table["unit"]) for entry in entries]
     return table
 
@@ -323,49 +190,71 @@ def _pattern(
     )
 
 
-def _expand_all(
-    table: Mapping[str, Any], enumerations: Mapping[str, Enumeration], roots: SimpleNamespace
-) -> Iterable[Variable]:
-    """Yields all variables by causality, in the order of interface.toml."""
+@dataclass(frozen=True)
+class Template:
+    """A variable without its robot.
+
+    path: from the roots to its start value; () where it is constant or absent.
+    """
+
+    variable: Variable
+    path: tuple[Step, ...]
+    enumeration: Enumeration | None
+
+    def start(self, roots: SimpleNamespace) -> float | int | None:
+        """Returns the start value; of an enumeration, the number of the item."""
+        if not self.path:
+            return self.variable.start
+        value: Any = roots
+        for step in self.path:
+            value = getattr(value, step) if isinstance(step, str) else value[step]
+        if isinstance(value, bool):
+            return value
+        return self.enumeration.number(value) if self.enumeration else float(value)
+
+
+@cache
+def _templates(component: Component) -> tuple[Template, ...]:
+    """Returns all variables by causality, in the order of interface.toml."""
+    table = read_table(component)
+    found: list[Template] = []
     for causality in CAUSALITIES:
         places = itertools.chain.from_iterable(
             expand(entry, table["axis"]) for entry in table.get(causality, [])
         )
-        for reference, (entry, place) in enumerate(
-            places, start=table["first_reference"][causality]
-        ):
-            yield _variable(entry, place, reference, causality, enumerations, roots, table)
+        found += [
+            _template(component, entry, place, reference, causality)
+            for reference, (entry, place) in enumerate(places, table["first_reference"][causality])
+        ]
+    return tuple(found)
 
 
-def _variable(
+def _template(
+    component: Component,
     entry: Mapping[str, Any],
     place: Mapping[str, tuple[int, str]],
     reference: int,
     causality: Causality,
-    enumerations: Mapping[str, Enumeration],
-    roots: SimpleNamespace,
-    table: Mapping[str, Any],
-) -> Variable:
+) -> Template:
     """Returns the variable of an entry at one combination of its axes."""
+    table = read_table(component)
     labels = {axis: label for axis, (_, label) in place.items()}
-    enumeration = enumerations.get(entry.get("type", ""))
+    enumeration = enumerations_of(component).get(entry.get("type", ""))
     kind: Type = "Enumeration" if enumeration else entry.get("type", "Real")
+    start, changes = entry.get("start"), kind == "Real" or causality == "parameter"
     variable = Variable(
         name=labelled(entry["name"], labels),
         reference=reference,
         type=kind,
         causality=causality,
         variability=entry.get(
-            "variability",
-            DEFAULT_VARIABILITY[causality]
-            if kind == "Real" or causality == "parameter"
-            else "discrete",
+            "variability", DEFAULT_VARIABILITY[causality] if changes else "discrete"
         ),
         unit=entry.get("unit"),
         minimum=1 if enumeration else entry.get("min"),
         maximum=len(enumeration.items) if enumeration else entry.get("max"),
         nominal=entry.get("nominal"),
-        start=_start(entry.get("start"), place, enumeration, roots),
+        start=None if isinstance(start, str) else start,
         enumeration=enumeration.name if enumeration else None,
         field=re.sub(r"\[(\w+)\]", lambda match: f"[{place[match[1]][0]}]", entry["field"]),
         description=entry["description"].format(**labels),
@@ -373,8 +262,17 @@ def _variable(
         initial=expand_names(entry.get("initial"), labels, table),
         group=entry.get("group"),
     )
-    _check_start(variable)
-    return variable
+    return Template(variable, _path(start, place), enumeration)
+
+
+def _path(start: Any, place: Mapping[str, tuple[int, str]]) -> tuple[Step, ...]:
+    """Returns the steps of a path such as robot.legs[leg].hip_yaw at a combination of axes."""
+    return tuple(
+        attribute or (place[axis][0] if axis in place else int(axis))
+        for attribute, axis in re.findall(
+            r"(?:^|\.)(\w+)|\[(\w+)\]", start if isinstance(start, str) else ""
+        )
+    )
 
 
 def _states(table: Mapping[str, Any]) -> Iterable[State]:
@@ -389,38 +287,6 @@ def _states(table: Mapping[str, Any]) -> Iterable[State]:
                 initial=expand_names(entry["initial"], labels, table) or (),
                 reinit=entry.get("reinit", False),
             )
-
-
-def _start(
-    given: float | str | None,
-    place: Mapping[str, tuple[int, str]],
-    enumeration: Enumeration | None,
-    roots: SimpleNamespace,
-) -> float | int | None:
-    """Returns a start value: a constant, or the value at a path such as robot.torso.mass."""
-    if not isinstance(given, str):
-        return given
-    return value_at(roots, start_path(given, place), enumeration)
-
-
-def start_path(given: str, place: Mapping[str, tuple[int, str]]) -> tuple[Step, ...]:
-    """Returns the steps of a path such as robot.legs[leg].hip_yaw at a combination of axes."""
-    return tuple(
-        attribute or (place[axis][0] if axis in place else int(axis))
-        for attribute, axis in re.findall(r"(?:^|\.)(\w+)|\[(\w+)\]", given)
-    )
-
-
-def value_at(
-    roots: SimpleNamespace, path: Iterable[Step], enumeration: Enumeration | None
-) -> float | int:
-    """Returns the value at a path from the roots; of an enumeration, the number of the item."""
-    value: Any = roots
-    for step in path:
-        value = getattr(value, step) if isinstance(step, str) else value[step]
-    if isinstance(value, bool):
-        return value
-    return enumeration.number(value) if enumeration else float(value)
 
 
 def _check_start(variable: Variable) -> None:

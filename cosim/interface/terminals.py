@@ -9,9 +9,9 @@ controller's terminal with the same members is connected as a whole.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from hexapod_cosim.cosim.interface.model_description import document_text
 from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES
 
 FOLDER = "terminalsAndIcons"
@@ -23,6 +23,7 @@ Group = tuple[str, str, tuple[str, ...]]  # name, meaning, members
 LEGS: tuple[Group, ...] = (
     ("command", "joint commands", COMMANDS),
     ("state", "joint states", STATES),
+    ("servo", "faults of the servos", ("strength", "lock")),
 )
 FOOT = "contact of the foot with the ground"
 TORSO: tuple[Group, ...] = (
@@ -44,51 +45,32 @@ MILLIMETRES = 0.1  # per unit of these coordinates
 
 
 def render_terminals(names: Sequence[str]) -> str:
-    """Returns the document for an FMI 2.0 FMU with scalar variables of these names."""
-    root, terminals = _document()
-    for leg in LEG_NAMES:
-        _add_leg(terminals, leg, names)
-    torso = _add(terminals, "torso", "what happens to the torso")
-    for name, text, starts in TORSO:
-        members = [
-            (variable, variable.partition(".")[2])
-            for variable in names
-            if variable.partition("[")[0] in starts
-        ]
-        if members:
-            _add(torso, name, text, members)
-    return _text(root)
+    """Returns the document for an FMU with inputs and outputs of these names.
 
-
-def render_terminals3(names: Sequence[str]) -> str:
-    """Returns the document for an FMI 3.0 FMU with these inputs and outputs.
-
-    They are arrays over legs and joints, so there is one set of terminals for all legs.
+    Each leg has terminals of its scalars in FMI 2.0. In FMI 3.0 variables are arrays over legs and
+    joints, so there is one set of terminals for all legs.
     """
     root, terminals = _document()
-    legs = _add(terminals, "legs", "all legs: arrays over legs and joints")
-    for name, text, quantities in LEGS:
-        _add(
-            legs, name, text, [(quantity, quantity) for quantity in quantities if quantity in names]
-        )
-    _add(
-        legs,
-        "foot",
-        FOOT,
-        [
-            (variable, variable.removeprefix("foot."))
-            for variable in names
-            if variable.startswith("foot.")
-        ],
-    )
+    legs = [
+        (leg, f"leg {leg}", f"{leg}.", [f"{joint}." for joint in JOINT_NAMES]) for leg in LEG_NAMES
+    ]
+    if not any(name.startswith(f"{LEG_NAMES[0]}.") for name in names):
+        legs = [("legs", "all legs: arrays over legs and joints", "", [""])]
+    for leg, about, start, joints in legs:
+        terminal, foot = _add(terminals, leg, about), f"{start}foot."
+        for name, text, quantities in LEGS:
+            members = [f"{joint}{quantity}" for joint in joints for quantity in quantities]
+            present = [(f"{start}{one}", one) for one in members if f"{start}{one}" in names]
+            if present:
+                _add(terminal, name, text, present)
+        points = [(one, one.removeprefix(foot)) for one in names if one.startswith(foot)]
+        _add(terminal, "foot", FOOT, points)
     torso = _add(terminals, "torso", "what happens to the torso")
     for name, text, starts in TORSO:
-        members = [
-            (variable, variable.partition(".")[2]) for variable in names if variable in starts
-        ]
-        if members:
-            _add(torso, name, text, members)
-    return _text(root)
+        found = [(one, one.partition(".")[2]) for one in names if one.partition("[")[0] in starts]
+        if found:
+            _add(torso, name, text, found)
+    return document_text(root)
 
 
 def _document() -> tuple[Element, Element]:
@@ -106,31 +88,6 @@ def _document() -> tuple[Element, Element]:
     )
     SubElement(picture, "Icon", corners)
     return root, SubElement(root, "Terminals")
-
-
-def _text(root: Element) -> str:
-    """Formats the document."""
-    ElementTree.indent(root)
-    text = ElementTree.tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
-
-
-def _add_leg(parent: Element, leg: str, names: Sequence[str]) -> None:
-    """Adds the terminals of a leg."""
-    terminal = _add(parent, leg, f"leg {leg}")
-    for name, text, quantities in LEGS:
-        members = [f"{joint}.{quantity}" for joint in JOINT_NAMES for quantity in quantities]
-        _add(
-            terminal,
-            name,
-            text,
-            [(f"{leg}.{member}", member) for member in members if f"{leg}.{member}" in names],
-        )
-    start = f"{leg}.foot."
-    foot = [
-        (variable, variable.removeprefix(start)) for variable in names if variable.startswith(start)
-    ]
-    _add(terminal, "foot", FOOT, foot)
 
 
 def _add(parent: Element, name: str, text: str, members: Iterable[tuple[str, str]] = ()) -> Element:

@@ -31,7 +31,8 @@ MOST_SHOWN = 12  # names in a message
 # sources of inputs, in the order of the vector that source_vector() fills
 SOURCES = [*COMMANDS, *READINGS]
 SINKS = [*JOINT_COMMANDS, *ACCELERATION]  # of outputs: the plant's inputs
-FLAGS = ("swinging", "unreachable", "fallback")
+FAULTY = [f"{joint}.faulty" for joint in JOINT_NAMES]
+FLAGS = ("swinging", "unreachable", "fallback", "absent", *FAULTY)
 SHIFT = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.shift", 2)]
 LIFT = [f"{leg}.lift" for leg in LEG_NAMES]
 PLANNED = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.planned")]

@@ -21,9 +21,10 @@ from hexapod_cosim.cosim.master.interrupts import Watch, interruptible, watched
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording, Rows
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.scenario.schedule import Schedule
-from hexapod_cosim.models import LEG_NAMES, HexapodError
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError
 
 COMPLETED, FAILED, INTERRUPTED = "completed", "failed", "interrupted"
+FAULTY = tuple(f"controller.{leg}.{j}.faulty" for j in JOINT_NAMES for leg in LEG_NAMES)
 PROGRESS_STEPS = 20  # macro-steps between two calls of the progress function
 TIME_LIMIT = 60.0  # s    wall time of one call of a controller; twice as much at most
 
@@ -112,12 +113,13 @@ def diagnostic_columns(controller: JointController) -> dict[tuple[str, ...], NDA
         return {}
     columns: dict[tuple[str, ...], NDArray[Any]] = {
         tuple(f"controller.{leg}.{key}" for leg in LEG_NAMES): getattr(shown, key)
-        for key in ("swinging", "unreachable", "lift", "fallback")
+        for key in ("swinging", "unreachable", "lift", "fallback", "absent")
     }
     # the columns are the controller's own arrays, which change with every call; a complex number
     # lies in memory as x, y
     columns[_leg_vectors("shift", 2)] = shown.shift.view(float)
     columns[_leg_vectors("planned", 3)] = shown.planned
+    columns[FAULTY] = shown.faulty
     return columns
 
 
@@ -140,13 +142,16 @@ def _loop(
 ) -> None:
     """Runs all macro-steps; the last row, at the end of the run, is followed by no step."""
     pushes, lost, measurement = schedule.pushes, schedule.lost, signals.measurement
-    servos = schedule.servos
+    servos, tunings = schedule.servos, list(reversed(schedule.tunings))
     signals.read()
     for k, (t, command) in enumerate(zip(schedule.times.tolist(), schedule.commands, strict=False)):
         if pushes is not None:
             signals.push[:] = pushes[k]
         if servos is not None:
             signals.set_servos(servos[k])
+        while tunings and tunings[-1][0] == k:
+            _, name, value = tunings.pop()
+            plant.set_parameters({name: value})
         watch.call = k + 1
         joints = controller.step(t, command, measurement)
         watch.call = 0

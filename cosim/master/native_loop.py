@@ -110,14 +110,11 @@ class NativeMaster:
         row = [*outputs, *flags, *SERVOS, *PUSH, *self._drive, *insides]
         self._places = {name: place for place, name in enumerate(row)}
         self._value = np.zeros(len(row) + len(READINGS))
+        everything = [name for name in row if name not in SERVOS]
         self.columns = tuple(
-            [name for name in row if name not in SERVOS]
-            if columns is None
-            else [
-                name
-                for name in columns
-                if name in self._places or not name.startswith("controller.")
-            ]
+            name
+            for name in (everything if columns is None else columns)
+            if name in self._places or not name.startswith("controller.")
         )
         self._judged = judged
         self._plant_inputs: dict[int, Any] = {}  # by the number of values before the drive
@@ -210,6 +207,9 @@ class NativeMaster:
             values = None if array is None else np.ascontiguousarray(array, dtype=kind)
             setattr(master, name, None if values is None else values.ctypes.data)
             kept.append(values)
+        kept.append(self._tunings(schedule))
+        master.tuning = ct.cast(kept[-1], ct.c_void_p) if schedule.tunings else None
+        master.tunings = len(schedule.tunings)
         sensed = [sensors.measured[name] for name in ours if name not in COMMANDS]
         kept.append(np.array(sensed, dtype=np.uintp))
         master.stepper.sensed = kept[-1].ctypes.data
@@ -231,6 +231,16 @@ class NativeMaster:
             return pushes
         still = np.zeros((len(servos), len(PUSH)))
         return np.hstack([servos, still if pushes is None else pushes])
+
+    def _tunings(self, schedule: Schedule) -> Any:
+        """Returns the changes of the plant's parameters as an array of hxTuning."""
+        plant, make = self._fmus["plant"], loop_header().types["hxTuning"]
+        return (make * len(schedule.tunings))(
+            *(
+                make(step, value, *plant.references([name]))
+                for step, name, value in schedule.tunings
+            )
+        )
 
     def _run_steps(
         self, times: NDArray[np.float64], h: float, rows: Rows, progress: Progress | None

@@ -26,8 +26,8 @@ COMMANDED = {
 }
 JOINT_COMMANDS = [name for names in COMMANDED.values() for name in names]
 ACCELERATION = joint_names("acceleration_ref")
-# strength and lock, leg by leg: 1 and 0 unless a servo has a fault
-SERVOS = [*joint_names("strength"), *joint_names("lock")]
+# 0 unless a servo has a fault
+SERVOS = [*joint_names("weakness"), *joint_names("lock")]
 PUSH = [*vector_names("torso.push_force"), *vector_names("torso.push_torque")]
 SHAPES = {"angle": (LEGS, JOINTS), "speed": (LEGS, JOINTS), "foot_force": (LEGS, len(AXES))}
 
@@ -101,7 +101,7 @@ class Signals:
         self.hold()
 
     def set_servos(self, states: NDArray[np.float64]) -> None:
-        """Writes the states (36,) of the servos, strengths and locks, where they have changed."""
+        """Writes the states (36,) of the servos, weaknesses and locks, where they have changed."""
         if self._servos is None or not np.array_equal(states, self._servos.values):
             self._servos = self._servos or self._plant.block(SERVOS)
             self._servos.values[...] = states

@@ -34,15 +34,43 @@ def draw_figures(views: Mapping[str, View], formats: Sequence[str] = ("svg",)) -
 
     images: dict[str, bytes] = {}
     skipped: dict[str, str] = {}
-    with matplotlib.rc_context(SETTINGS):
+    with matplotlib.rc_context(SETTINGS | {"figure.constrained_layout.use": False}):
         for name, draw in DRAWINGS.items():
             try:
                 figure = draw(views)
             except ColumnError as error:
                 skipped[name] = f"{error.got} was not recorded"
                 continue
+            place_axes(figure)
             images |= {f"{name}.{kind}": content for kind, content in figure_files(figure, formats)}
     return Figures(images, skipped)
+
+
+def place_axes(figure: Figure) -> None:
+    """Places the axes of a grid by margins and gaps in inches, below the figure's legend.
+
+    Matplotlib's own layout takes twice as long as to write the figure as SVG.
+    """
+    width, height = figure.get_size_inches()
+    left, right, bottom, top = 0.6, 0.12, 0.42, 0.45
+    places = [(axis, place) for axis in figure.axes if (place := axis.get_subplotspec())]
+    rows, columns = places[0][1].get_gridspec().get_geometry()
+    inner = any(not place.is_first_col() and axis.get_ylabel() for axis, place in places)
+    numbered = any(
+        not place.is_last_row() and axis.xaxis.get_tick_params().get("labelbottom", True)
+        for axis, place in places
+    )
+    beside, below = 0.7 if inner else 0.2, 0.55 if numbered else 0.3
+    wide = (width - left - right - (columns - 1) * beside) / columns
+    high = (height - bottom - top - (rows - 1) * below) / rows
+    figure.subplots_adjust(
+        left=left / width,
+        right=1.0 - right / width,
+        bottom=bottom / height,
+        top=1.0 - top / height,
+        wspace=beside / wide,
+        hspace=below / high,
+    )
 
 
 def figure_files(

@@ -12,7 +12,7 @@ import numpy as np
 from hexapod_cosim.cosim.results.comparison import BETTER, WORSE, Change, Comparison
 from hexapod_cosim.cosim.results.facts import RunFacts
 from hexapod_cosim.cosim.results.metric_table import METRICS, PER_RADIAN
-from hexapod_cosim.cosim.results.window import TANH
+from hexapod_cosim.cosim.results.window import friction_law
 from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.models.ground.surface import LAW, Surface
 
@@ -112,7 +112,7 @@ def creep_note(facts: RunFacts, surface: Surface | None = None) -> str:
     surface: the run's.
     """
     parameters = facts.parameters
-    creeps = parameters.get("friction.law", TANH) == TANH
+    creeps = friction_law(parameters).creeps
     return CREEP if creeps and not _has_soil(parameters, surface) else ""
 
 

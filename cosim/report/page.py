@@ -24,16 +24,14 @@ NO_VIEWER = (
 
 
 @cache
-def environment(extension: str = "") -> Environment:
+def environment(package: str = "") -> Environment:
     """Returns the templates of this folder; reports extend `base.html.jinja`.
 
-    extension: name of the extension whose folder has further templates.
+    package: whose folder has further templates, such as that of an extension.
     """
-    folders = [PackageLoader("hexapod_cosim.cosim", "report")]
-    if extension:
-        folders.append(PackageLoader("hexapod_cosim.extensions", extension))
+    packages = ["hexapod_cosim.cosim.report", *([package] if package else [])]
     return Environment(
-        loader=ChoiceLoader(folders),
+        loader=ChoiceLoader([PackageLoader(one, "") for one in packages]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -42,11 +40,11 @@ def environment(extension: str = "") -> Environment:
 
 
 def render(
-    template: str, *, controls: Iterable[str] = (), extension: str = "", **content: Any
+    template: str, *, controls: Iterable[str] = (), package: str = "", **content: Any
 ) -> str:
     """Renders a page with the colours of the figures; `controls` are the labels on it."""
     styles = all_styles(controls)
-    return environment(extension).get_template(template).render(styles=styles, **content)
+    return environment(package).get_template(template).render(styles=styles, **content)
 
 
 def embedded(svg: Path) -> str:

@@ -6,15 +6,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
-from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change
-from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.metric_table import DUST, FLOORS, METRICS, shown_metrics
 from hexapod_cosim.cosim.results.side_by_side import Comparisons
-from hexapod_cosim.cosim.results.window import Array
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 SHOWN = 0.0005  # relative; a smaller effect would be shown as 0.0 %
@@ -51,7 +46,7 @@ def comparison_rows(comparison: Comparisons, *, net_slip: bool = False) -> Rows:
     """
     rows = metric_rows(comparison.means, net_slip=net_slip)
     for row in rows:
-        changes = [_shown_change(pair.changes[row["name"]]) for pair in comparison.pairs]
+        changes = [shown_change(pair.changes[row["name"]]) for pair in comparison.pairs]
         row |= {**changes[0], "changes": changes}
     count, walked = len(comparison.seeds), comparison.walked
     if count == 1:
@@ -71,7 +66,8 @@ def comparison_rows(comparison: Comparisons, *, net_slip: bool = False) -> Rows:
     return [first, *rows]
 
 
-def _shown_change(change: Change) -> dict[str, str]:
+def shown_change(change: Change) -> dict[str, str]:
+    """Returns a change, its interval and its verdict as texts, "" where there is none."""
     return {"change": _change(change), "interval": _interval(change), "verdict": change.verdict}
 
 
@@ -200,36 +196,3 @@ def about_accuracy(accuracies: Mapping[str, Accuracy]) -> str:
         f"Half the macro-step, {first.macro_step:g} s, in which the controller acts and outputs "
         "are read twice as often, changes:"
     )
-
-
-def servo_loads(run: StoredResult) -> Array | None:
-    """Returns the loads (6, 3) over the judged walk; None where the run has no such metric.
-
-    The rating is that by which the run's metric servo_load_max was computed.
-    """
-    walk, largest = run.view.window, run.metrics.get("servo_load_max")
-    if walk is None or largest is None or not np.isfinite(largest):
-        return None
-    squares = walk.gained(joint_names("torque_squared")).reshape(SIZE)
-    return np.asarray(largest * np.sqrt(squares / max(squares.max(), np.finfo(float).tiny)))
-
-
-def servo_rows(runs: Mapping[str, StoredResult]) -> list[dict[str, Any]]:
-    """Returns a row per leg: its name and, by control and joint, the loads in per cent as texts.
-
-    There are no rows when no run has loads.
-    """
-    loads = {label: servo_loads(run) for label, run in runs.items()}
-    if all(load is None for load in loads.values()):
-        return []
-    return [
-        {
-            "name": leg,
-            "values": [
-                "-" if load is None else f"{100.0 * load[k, j]:.0f}"
-                for load in loads.values()
-                for j in range(len(JOINT_NAMES))
-            ],
-        }
-        for k, leg in enumerate(LEG_NAMES)
-    ]

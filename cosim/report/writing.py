@@ -26,7 +26,6 @@ from hexapod_cosim.cosim.report.tables import (
     comparison_rows,
     effect_rows,
     metric_rows,
-    servo_rows,
     with_errors,
 )
 from hexapod_cosim.cosim.results.accuracy import Accuracy
@@ -37,7 +36,6 @@ from hexapod_cosim.cosim.results.ground import describe_terrain
 from hexapod_cosim.cosim.results.metric_table import has_net_slip
 from hexapod_cosim.cosim.results.metrics import plans_feet
 from hexapod_cosim.cosim.results.side_by_side import Comparisons
-from hexapod_cosim.models import JOINT_NAMES
 
 ALL_FORMATS = ("svg", "png")  # of figures
 REPORT, PLOTS, PROFILE = "report.html", "plots", "profile"
@@ -216,8 +214,6 @@ def _facts(runs: Mapping[str, StoredResult]) -> dict[str, Any]:
             for label, one in facts.items()
             if one.gains
         },
-        "servos": servo_rows(runs),
-        "joints": JOINT_NAMES,
     }
 
 

@@ -16,6 +16,7 @@ from hexapod_cosim.models.ground.surface import Surface
 MAIN = ("slip_per_metre", "peak_force", "path_error", "cost_of_transport")  # of a repr
 
 OF_FMU = "controller FMU"  # a stance that is read from such an FMU
+OWN_CONTROLLER = "own controller"  # of the user, which plans a walk that is not known here
 LEAST_LENGTH = 5e-4  # m    a smaller change of the stance is not named
 
 
@@ -48,6 +49,9 @@ class Locomotion:
     missed: str = ""  # how it missed the end of its commanded path; "" when it arrived
 
 
+PYTHON, COMPILED = ENGINES = ("python", "compiled")  # loop and controller of a run
+
+
 @dataclass(frozen=True, kw_only=True)
 class RunFacts:
     """The content of run.json."""
@@ -56,6 +60,7 @@ class RunFacts:
     reason: str  # a sentence; "" when completed
     title: str
     control: str  # label
+    engine: str  # of ENGINES
     simulated: float  # s
     wall: float  # s
     realtime_factor: float  # simulated over wall time
@@ -162,17 +167,20 @@ class GaitChoice:
     outward: float  # m    by which the feet stand further out from the hips than the robot's
     deeper: float  # m    and deeper below them
     narrowing: float  # m    by which the feet are set nearer together at speed
-    chosen_by: str  # scenario, control or robot file
+    chosen_by: str  # scenario, control, robot file or OWN_CONTROLLER
 
     @property
     def brief(self) -> str:
-        """Gait and stance."""
+        """Gait and stance; of an own controller, the cycle that figures are taken over."""
+        if self.chosen_by == OWN_CONTROLLER:
+            return f"{OWN_CONTROLLER}, figures over cycles of {self.period:.3g} s"
         return f"{self.gait}, period {self.period:.3g} s, {self._feet()}"
 
     @property
     def text(self) -> str:
         """Gait and stance, and whose choice they were."""
-        return f"{self.brief}, chosen by the {self.chosen_by}"
+        by = "" if self.chosen_by == OWN_CONTROLLER else f", chosen by the {self.chosen_by}"
+        return f"{self.brief}{by}"
 
     def _feet(self) -> str:
         """Returns the stance against the robot file's, or that it is a controller FMU's."""
@@ -200,7 +208,4 @@ def gait_differences(choices: Mapping[str, GaitChoice]) -> list[str]:
         groups.setdefault(choice.brief, []).append(label)
     if len(groups) < 2:
         return []
-    return [
-        f"{', '.join(labels)} {'walks' if len(labels) == 1 else 'walk'} {choices[labels[0]].text}"
-        for labels in groups.values()
-    ]
+    return [f"{', '.join(labels)}: {choices[labels[0]].text}" for labels in groups.values()]

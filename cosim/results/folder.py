@@ -11,6 +11,7 @@ from typing import Any
 import tomlkit
 
 from hexapod_cosim.cosim.common.files import (
+    RESULT_FILES,
     RUN_FILE,
     RUNNING,
     claim_folder,
@@ -56,27 +57,29 @@ class StoredResult:
 class ResultsFolder:
     """A folder for results, which keeps those of an earlier run until the new run has begun."""
 
-    def __init__(self, path: Path, parts: Sequence[str] = ()) -> None:
+    def __init__(self, path: Path, parts: Sequence[str] = (), own: Sequence[str] = ()) -> None:
         self.path = path
         self.begun = False
-        self._parts = parts
+        self._parts, self._files = parts, (*RESULT_FILES, *own)
 
     def begin(self) -> None:
         """Clears the folder at the first call."""
         if not self.begun:
-            clear_folder(self.path, self._parts)
+            clear_folder(self.path, self._parts, self._files)
             self.begun = True
 
 
 @contextmanager
-def results_folder(path: Path, parts: Sequence[str] = ()) -> Iterator[ResultsFolder]:
+def results_folder(
+    path: Path, parts: Sequence[str] = (), own: Sequence[str] = ()
+) -> Iterator[ResultsFolder]:
     """Claims a folder for a run; if the block fails once the run has begun, run.json says so.
 
-    `parts`: names of the folders in it that a comparison writes. Raises HexapodError when the
-    folder cannot be used.
+    `parts`: names of the folders in it that a comparison writes; `own`: files that the command
+    writes besides RESULT_FILES. Raises HexapodError when the folder cannot be used.
     """
     made = claim_folder(path)
-    folder = ResultsFolder(path, parts)
+    folder = ResultsFolder(path, parts, own)
     release = _lock(path)
     try:
         yield folder
@@ -158,9 +161,7 @@ def read_result(folder: Path) -> StoredResult:
     view = View(read_recording(folder, RESULTS), facts.parameters, facts.gait_period, surface)
     checked = metrics.pop(ACCURACY, None)
     metrics.pop(WARNINGS, None)  # also in run.json
-    accuracy = None
-    if checked is not None:
-        accuracy = accuracy_from_table(checked, where=str(folder / METRICS_FILE))
+    accuracy = None if checked is None else accuracy_from_table(checked)
     return StoredResult(view, metrics, facts, read_scenario(folder), accuracy)
 
 
@@ -253,9 +254,5 @@ def read_accuracies(folder: Path) -> dict[str, Accuracy]:
 
     Raises HexapodError.
     """
-    path = folder / METRICS_FILE
-    table = read_json(path)
-    checked = table.get(ACCURACY, {}) if isinstance(table, dict) else {}
-    return {
-        control: accuracy_from_table(item, where=str(path)) for control, item in checked.items()
-    }
+    checked = read_json(folder / METRICS_FILE).get(ACCURACY, {})
+    return {control: accuracy_from_table(item) for control, item in checked.items()}

@@ -18,8 +18,10 @@ spot, is at most ARRIVE.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +30,20 @@ from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.facts import Locomotion
 from hexapod_cosim.cosim.results.support import body_height, ground_normal
 from hexapod_cosim.cosim.results.window import LEAST_DISTANCE, LEAST_TURN, View
-from hexapod_cosim.models import LEG_NAMES, Robot
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, Robot
 
 ARRIVE = 0.5  # m/m, rad/rad    largest path error, or yaw drift of a turn on the spot
+FINDINGS = (  # flag of the controller, what its begin and its end mean
+    *(
+        (
+            f"{joint}.faulty",
+            f"the controller finds that the servo of {{leg}}.{joint} does not work",
+            f"the controller finds that the servo of {{leg}}.{joint} works again",
+        )
+        for joint in JOINT_NAMES
+    ),
+    ("absent", "the controller walks without {leg}", "the controller walks with {leg} again"),
+)
 SURELY = 2.0  # times the least walk: a shorter commanded way asks for no walk
 UPRIGHT = 0.6  # rad
 SUNK = 0.5  # 1
@@ -88,6 +101,22 @@ def fallback_columns(recording: Recording) -> NDArray[np.bool_]:
     if not set(names) <= set(recording.names):
         return np.zeros((0, len(LEG_NAMES)), dtype=np.bool_)
     return recording.columns(names) > 0.5
+
+
+def found_faults(recording: Recording) -> list[dict[str, Any]]:
+    """Returns time [s from the start] and text of what the controller found at servos and legs."""
+    found, start = [], float(recording.time[0]) if len(recording.time) else 0.0
+    for flag, begins, ends in FINDINGS:
+        for leg in LEG_NAMES:
+            if (name := f"controller.{leg}.{flag}") not in recording.names:
+                continue
+            edges = np.diff(recording.column(name) > 0.5, prepend=False)
+            times = recording.time[edges] - start
+            texts = itertools.cycle((begins.format(leg=leg), ends.format(leg=leg)))
+            found += [
+                {"time": float(t), "text": text} for t, text in zip(times, texts, strict=False)
+            ]
+    return sorted(found, key=lambda event: event["time"])
 
 
 def describe_fall(view: View, robot: Robot) -> str:

@@ -7,9 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.cosim.results.window import (
-    TANH,
-)
+from hexapod_cosim.cosim.results.window import friction_law
 
 
 class Metric(NamedTuple):
@@ -135,4 +133,4 @@ def shown_metrics(runs: Mapping[str, Mapping[str, float | None]], *, net_slip: b
 
 def has_net_slip(parameters: Mapping[str, float]) -> bool:
     """Returns whether slip_net_per_metre is meaningful: under the tanh law it only inverts it."""
-    return parameters.get("friction.law", TANH) != TANH
+    return not friction_law(parameters).creeps

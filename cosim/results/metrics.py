@@ -19,26 +19,23 @@ from hexapod_cosim.cosim.interface.names import (
     joint_names,
     vector_names,
 )
+from hexapod_cosim.cosim.master.connection import FLAGS
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.metric_table import METRICS, PER_RADIAN
 from hexapod_cosim.cosim.results.support import body_height, real_feet, stability_margins
 from hexapod_cosim.cosim.results.window import (
     CONTACT_SHARE,
-    NONE,
-    TANH,
-    WITH_BRISTLES,
     Array,
     JudgedWindow,
     View,
     bearing_load,
     commanded_path,
+    friction_law,
+    law_name,
 )
-from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, Friction, Servo
+from hexapod_cosim.models import LEG_NAMES, Friction, Servo
 from hexapod_cosim.models.friction import yielding_velocity
 from hexapod_cosim.models.measure import CONE_BINS, CONE_STARTS
-
-TANH_LIMIT = 0.999  # limits atanh: a larger share is sliding, not creep
-
 
 PLANNED = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.planned"))
 # Time of all feet under load by the share of the friction cone used: bins begin at 0.9 (i/30)^2,
@@ -75,11 +72,7 @@ _JUDGED = (
         for name in foot_names(quantity)
     ),
     *foot_vector_names("position"),
-    *(
-        f"controller.{leg}.{flag}"
-        for flag in ("swinging", "unreachable", "fallback")
-        for leg in LEG_NAMES
-    ),
+    *(f"controller.{leg}.{flag}" for flag in FLAGS for leg in LEG_NAMES),
     *PLANNED,
 )
 _JUDGED_BRISTLES = tuple(
@@ -130,23 +123,23 @@ def _net_slip(part: Recording, parameters: Mapping[str, float]) -> Array:
 
     That motion is the creep of the tanh law, or the stretch and return of a bristle.
     """
-    if parameters.get("friction.law", TANH) in WITH_BRISTLES:
+    law, friction = friction_law(parameters), _friction(parameters)
+    if law.has_bristles:
         sliding = yielding_velocity(
-            _friction(parameters), part.foot_vectors("velocity"), part.foot_vectors("bristle")
+            friction, part.foot_vectors("velocity"), part.foot_vectors("bristle")
         )
         return np.asarray(np.linalg.norm(sliding, axis=-1))
-    creep = (
-        np.arctanh(np.minimum(cone_use(part, parameters), TANH_LIMIT))
-        / parameters["friction.slope"]
-    )
-    return np.maximum(part.feet("slip_speed") - creep, 0.0)
+    speed = part.feet("slip_speed")
+    if law.creep is None:
+        return speed
+    return np.maximum(speed - law.creep(friction, cone_use(part, parameters)), 0.0)
 
 
 def _friction(parameters: Mapping[str, float]) -> Friction:
     """Returns the friction law of a run from the FMU's parameters."""
     names = ("mu", "mu_static", "slope", "presliding", "bristle_damping", "stribeck_speed")
-    law = FRICTION_LAWS[round(parameters["friction.law"]) - 1]
-    return Friction(law=law, **{name: parameters[f"friction.{name}"] for name in names})
+    facts = {name: parameters[f"friction.{name}"] for name in names}
+    return Friction(law=law_name(parameters), **facts)
 
 
 def cone_use(part: Recording, parameters: Mapping[str, float]) -> Array:
@@ -164,7 +157,7 @@ def cone_use(part: Recording, parameters: Mapping[str, float]) -> Array:
 def _cone(window: JudgedWindow, parameters: Mapping[str, float]) -> dict[str, float]:
     names = ("cone_use_p50", "cone_use_p95", "cone_use_over_90")
     times = window.gained(list(CONE_TIMES))
-    slippery = parameters["friction.mu"] == 0.0 or parameters.get("friction.law", TANH) == NONE
+    slippery = parameters["friction.mu"] == 0.0 or not friction_law(parameters).has_friction
     if slippery or not times.any():
         return dict.fromkeys(names, np.nan)
     # within a bin time is taken as even over the root of the share, by which bins are equally wide

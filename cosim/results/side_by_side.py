@@ -15,7 +15,6 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import tomlkit
 
 from hexapod_cosim.cosim.common.files import PARTS, RUN_FILE, atomic_text, write_json, write_text
@@ -23,13 +22,18 @@ from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs, judged_pairs
 from hexapod_cosim.cosim.results.folder import METRICS_FILE, SCENARIO
 from hexapod_cosim.cosim.results.metric_table import METRICS
-from hexapod_cosim.cosim.results.summary import Summary, Unbalanced, described_losses
+from hexapod_cosim.cosim.results.summary import (
+    Summary,
+    balance_warnings,
+    described_losses,
+    finite_mean,
+)
 from hexapod_cosim.cosim.scenario.controls import AT, reference_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError
 
 WALKS = "walks"  # key of run.json
-SEEDS, SEEDS_PARTIAL = "seeds.csv", "seeds.partial.csv"
+SEEDS = "seeds.csv"
 FACTS = tuple(item.name for item in fields(Summary) if item.name != "metrics")
 SEPARATOR = " | "  # between the warnings of a run in one cell
 
@@ -87,7 +91,7 @@ class Comparisons:
     def means(self) -> dict[str, dict[str, float]]:
         """Mean of each metric, by control and metric."""
         return {
-            label: {name: _mean([run.metrics[name] for run in runs]) for name in METRICS}
+            label: {name: finite_mean([run.metrics[name] for run in runs]) for name in METRICS}
             for label, runs in self.judged.items()
         }
 
@@ -102,8 +106,8 @@ class Comparisons:
         return [
             text
             for label, runs in self.runs.items()
-            for text in Unbalanced.among([run.metrics["energy_residual"] for run in runs]).warnings(
-                label, runs=len(runs)
+            for text in balance_warnings(
+                label, [run.metrics["energy_residual"] for run in runs], runs=len(runs)
             )
         ]
 
@@ -172,12 +176,6 @@ def write_comparison(
     return [folder / name for name in (SCENARIO, METRICS_FILE, RUN_FILE)]
 
 
-def _mean(values: Sequence[float]) -> float:
-    """Returns the mean of the finite values, NaN without any."""
-    finite = np.array(values)[np.isfinite(values)]
-    return float(finite.mean()) if len(finite) else float("nan")
-
-
 def write_seeds(path: Path, runs: Sequence[Summary]) -> None:
     """Writes seeds.csv, one line per run with its facts and metrics. The file is never partial."""
     with atomic_text(path) as file:
@@ -196,27 +194,18 @@ def _cell(value: Any) -> Any:
 
 def read_seeds(path: Path) -> dict[str, list[Summary]]:
     """Reads the runs of seeds.csv, by control. Raises HexapodError for a damaged file."""
-    fix = "run `hexapod compare` again"
     runs: dict[str, list[Summary]] = {}
     try:
         with path.open(encoding="utf-8", newline="") as file:
             for row in csv.DictReader(file):
                 runs.setdefault(row["control"], []).append(_summary(row))
-    except OSError as error:
+    except (OSError, KeyError, TypeError, ValueError, csv.Error) as error:
+        missing = error.strerror if isinstance(error, OSError) else ""
         raise HexapodError(
-            "no runs by seed",
-            got=error.strerror,
-            expected=f"{SEEDS} of a comparison",
-            fix=fix,
-            where=str(path),
-        ) from error
-    except (KeyError, TypeError, ValueError, csv.Error) as error:
-        expected = "a line per run, with all metrics"
-        raise HexapodError(
-            "damaged file",
-            got=f"{type(error).__name__}: {error}",
-            expected=expected,
-            fix=fix,
+            "no runs by seed" if missing else "damaged file",
+            got=missing or f"{type(error).__name__}: {error}",
+            expected=f"{SEEDS} of a comparison, with a line per run and all metrics",
+            fix="run `hexapod compare` again",
             where=str(path),
         ) from error
     return runs

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.facts import Result
@@ -88,29 +87,23 @@ def refused_summary(scenario: Scenario, error: HexapodError) -> Summary:
     )
 
 
-@dataclass(frozen=True)
-class Unbalanced:
-    """The runs whose energy residual is larger than UNBALANCED."""
+def finite_mean(values: Sequence[float]) -> float:
+    """Returns the mean of the finite values, NaN without any."""
+    finite = [value for value in values if math.isfinite(value)]
+    return float(np.mean(finite)) if finite else math.nan
 
-    count: int = 0
-    largest: float = 0.0  # residual over the motors' work
 
-    @classmethod
-    def among(cls, residuals: ArrayLike) -> Unbalanced:
-        """Returns those among runs with these residuals, NaN for runs without metrics."""
-        values = np.asarray(residuals, dtype=np.float64)
-        above = values[values > UNBALANCED]
-        return cls(above.size, float(above.max(initial=0.0)))
+def balance_warnings(control: str, residuals: Sequence[float], *, runs: int) -> list[str]:
+    """Warns of runs whose energy residual is larger than UNBALANCED.
 
-    def warnings(self, control: str, *, runs: int) -> list[str]:
-        """Returns one warning for all runs under a control, or none.
-
-        Args:
-            control: of the runs.
-            runs: number of runs, balanced ones included.
-        """
-        text = (
-            f"{control}: the energy balance of {self.count} of {runs} runs misses more than "
-            f"{100.0 * UNBALANCED:g} %, at most {100.0 * self.largest:.3g} %: {FIX}"
-        )
-        return [text] if self.count else []
+    Args:
+        control: of the runs.
+        residuals: over the motors' work; NaN for runs without metrics.
+        runs: number of runs under the control.
+    """
+    above = [value for value in residuals if value > UNBALANCED]
+    text = (
+        f"{control}: the energy balance of {len(above)} of {runs} runs misses more than "
+        f"{100.0 * UNBALANCED:g} %, at most {100.0 * max(above, default=0.0):.3g} %: {FIX}"
+    )
+    return [text] if above else []

@@ -12,12 +12,11 @@ import numpy as np
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.locomotion import fallback_columns
-from hexapod_cosim.cosim.results.summary import FIX, Unbalanced
+from hexapod_cosim.cosim.results.summary import FIX, UNBALANCED
 from hexapod_cosim.cosim.results.support import ground_normal
-from hexapod_cosim.cosim.results.window import LEAST_DISTANCE, SKIPPED_CYCLES, View
-from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, Robot
-from hexapod_cosim.models.friction import BRISTLE_LAWS
+from hexapod_cosim.cosim.results.window import LEAST_DISTANCE, SKIPPED_CYCLES, View, friction_law
+from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
+from hexapod_cosim.models import LEG_NAMES, Robot
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.records import SELF_CONTACTS, Foot, Servo
 from hexapod_cosim.models.soil.law import soil_radius
@@ -49,10 +48,10 @@ def fallback_warnings(recording: Recording) -> list[str]:
 
 def friction_warnings(parameters: Mapping[str, float]) -> list[str]:
     """Warns where friction is too weak for the robot to stay in place or to move forward."""
-    law = FRICTION_LAWS[round(parameters["friction.law"]) - 1]
-    mu = 0.0 if law == "none" else parameters["friction.mu"]
+    law = friction_law(parameters)
+    mu = parameters["friction.mu"] if law.has_friction else 0.0
     gravity = np.array([parameters[name] for name in vector_names("gravity")])
-    static = parameters.get("friction.mu_static", 0.0) if law in BRISTLE_LAWS else 0.0
+    static = parameters.get("friction.mu_static", 0.0) if law.has_bristles else 0.0
     slide = float(np.linalg.norm(sliding(gravity, ground_normal(parameters), mu, static)))
     if slide:
         why = "without friction" if mu == 0.0 else f"which friction (mu = {mu:g}) does not hold"
@@ -77,6 +76,8 @@ def unused_settings(scenario: Scenario, robot: Robot) -> list[str]:
         for command in scenario.commands
         if command.time >= end
     ]
+    if scenario.gains and scenario.control == CONTROLS[0]:
+        found.append(f"[gains] does nothing: {CONTROLS[0]} control has none")
     kind = scenario.settings.get("terrain", {}).get("kind", robot.terrain.name)
     given = {**scenario.settings.get("terrain", {}), **scenario.parameters}
     sloped = [
@@ -130,47 +131,39 @@ def sinkage_warnings(recording: Recording, parameters: Mapping[str, float]) -> l
 
 
 def overlap_warnings(recording: Recording, parameters: Mapping[str, float]) -> list[str]:
-    """Warns of neighbouring legs that overlap, with time and place of the deepest overlap.
-
-    With body.self_contact = warn; with force `push_warnings` describes how legs pushed each
-    other; with off there are none.
+    """Warns of legs that overlap (body.self_contact = warn) or push each other (force), with time
+    and size of the largest overlap or force.
     """
     choice = SELF_CONTACTS[round(parameters.get("body.self_contact", 1.0)) - 1]
-    if choice == "force":
-        return push_warnings(recording)
-    names = [f"{leg}.clearance" for leg in LEG_NAMES]
-    if choice == "off" or not set(names) <= set(recording.names):
-        return []
-    clearance = recording.columns(names)
-    if not len(clearance) or not clearance.min() < 0.0:
-        return []
-    row, leg = np.unravel_index(int(np.argmin(clearance)), clearance.shape)
-    first = int(np.argmax((clearance < 0.0).any(axis=1)))
-    share = float((clearance < 0.0).any(axis=1).mean())
-    return [
-        f"legs overlapped from {recording.time[first]:.3f} s on, for {share:.1%} of the time: leg "
-        f"{LEG_NAMES[leg]} was {-1e3 * clearance[row, leg]:.3g} mm inside its neighbour at "
-        f"{recording.time[row]:.3f} s, and legs exert no force on each other; use shorter steps or "
-        "a slower turn, or let them push each other with body.self_contact=force"
+    stem = "neighbour_force" if choice == "force" else "clearance"
+    names = [
+        name
+        for leg in LEG_NAMES
+        for name in (vector_names(f"{leg}.{stem}") if choice == "force" else [f"{leg}.{stem}"])
     ]
-
-
-def push_warnings(recording: Recording) -> list[str]:
-    """Warns of neighbouring legs that push each other, with time and size of the largest force."""
-    names = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.neighbour_force")]
-    if not len(recording.time) or not set(names) <= set(recording.names):
+    if choice == "off" or not len(recording.time) or not set(names) <= set(recording.names):
         return []
-    force = np.linalg.norm(recording.columns(names).reshape(-1, len(LEG_NAMES), 3), axis=2)
-    in_contact = (force > 0.0).any(axis=1)
-    if not in_contact.any():
+    columns = recording.columns(names)
+    if choice == "force":
+        size = np.linalg.norm(columns.reshape(-1, len(LEG_NAMES), 3), axis=2)  # N
+    else:
+        size = np.maximum(-1e3 * columns, 0.0)  # mm
+    met = (size > 0.0).any(axis=1)
+    if not met.any():
         return []
-    row, leg = np.unravel_index(int(np.argmax(force)), force.shape)
-    begin, share = recording.time[int(np.argmax(in_contact))], float(in_contact.mean())
+    row, leg = np.unravel_index(int(np.argmax(size)), size.shape)
+    what, how, rest = {
+        "force": ("pushed each other", f"with {size[row, leg]:.3g} N", ""),
+        "warn": (
+            "overlapped",
+            f"by {size[row, leg]:.3g} mm",
+            ", or let them push each other with body.self_contact=force",
+        ),
+    }[choice]
     return [
-        f"legs touched each other from {begin:.3f} s on, for "
-        f"{share:.1%} of the time: leg {LEG_NAMES[leg]} and its neighbour pushed "
-        f"each other with {force[row, leg]:.3g} N at {recording.time[row]:.3f} s; use shorter "
-        "steps or a slower turn"
+        f"legs {what} from {recording.time[int(np.argmax(met))]:.3f} s on, for {met.mean():.1%} of "
+        f"the time: leg {LEG_NAMES[leg]} and its neighbour {how} at {recording.time[row]:.3f} s; "
+        f"use shorter steps or a slower turn{rest}"
     ]
 
 
@@ -260,4 +253,4 @@ def heat_warnings(recording: Recording, servo: Servo) -> list[str]:
 def run_balance_warnings(residual: float) -> list[str]:
     """Warns where a run's balance misses more than metrics of energy can tolerate."""
     text = f"the energy balance does not explain {residual:.2%} of the motors' work: {FIX}"
-    return [text] if Unbalanced.among([residual]).count else []
+    return [text] if residual > UNBALANCED else []

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Recording
 from hexapod_cosim.models import FRICTION_LAWS
-from hexapod_cosim.models.friction import BRISTLE_LAWS
+from hexapod_cosim.models.friction import LAWS, FrictionLaw
 from hexapod_cosim.models.ground.surface import Surface
 
 Array = NDArray[np.float64]
@@ -28,8 +28,16 @@ LEAST_DISTANCE = 0.01  # m    less is standing, not walking
 LEAST_TURN = 0.05  # rad    less is standing, not turning
 SHOWN_CYCLES = 3  # in plots of what happens within a gait cycle
 ROUND_OFF = 1e-6  # s    of a recorded time
-NONE, TANH = (FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh"))
-WITH_BRISTLES = tuple(FRICTION_LAWS.index(law) + 1 for law in BRISTLE_LAWS)
+
+
+def law_name(parameters: Mapping[str, float]) -> str:
+    """Returns the name of the friction law of a run; by default that of the robot file."""
+    return FRICTION_LAWS[round(parameters.get("friction.law", 1.0)) - 1]
+
+
+def friction_law(parameters: Mapping[str, float]) -> FrictionLaw:
+    """Returns the row of the friction law of a run."""
+    return LAWS[law_name(parameters)]
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ MAX_DESIGNS = 64  # sets of gains that a process keeps; the least recently used 
 Design = TypeVar("Design")
 
 
-class Stance(NamedTuple):
+class StanceChange(NamedTuple):
     """By how much a robot's feet are moved from its own stance."""
 
     outward: float  # m    further out from the hips
@@ -64,8 +64,11 @@ def kept_gains(
 
 
 def kept_stance(
-    robot: Robot, gait: Gait, make: Callable[[Robot, Gait], Stance], folder: Path | None = None
-) -> Stance:
+    robot: Robot,
+    gait: Gait,
+    make: Callable[[Robot, Gait], StanceChange],
+    folder: Path | None = None,
+) -> StanceChange:
     """Returns the designed stance of a robot and a gait, as kept_gains."""
     path = _path("stances", robot, gait, folder).with_suffix(".json")
     return _kept(path, _read_stance, lambda: make(robot, gait), _write_stance)
@@ -103,17 +106,17 @@ def _read_gains(path: Path) -> Gains | None:
         return None
 
 
-def _read_stance(path: Path) -> Stance | None:
+def _read_stance(path: Path) -> StanceChange | None:
     """Returns a stance; None when it is absent or damaged."""
     try:
         table = json.loads(path.read_text(encoding="utf-8"))
-        stance = Stance(float(table["outward"]), float(table["deeper"]))
+        stance = StanceChange(float(table["outward"]), float(table["deeper"]))
     except (OSError, ValueError, TypeError, KeyError):
         return None
     return stance if all(map(math.isfinite, stance)) else None
 
 
-def _write_stance(stance: Stance, path: Path) -> None:
+def _write_stance(stance: StanceChange, path: Path) -> None:
     path.write_text(json.dumps(stance._asdict()), encoding="utf-8")
 
 

@@ -33,8 +33,8 @@ from hexapod_cosim.cosim.design.stance import (
     with_stance,
 )
 from hexapod_cosim.cosim.export.robot_package import SPEED
-from hexapod_cosim.cosim.results.facts import OF_FMU, GaitChoice
-from hexapod_cosim.cosim.run.designs import Stance, kept_stance
+from hexapod_cosim.cosim.results.facts import OF_FMU, OWN_CONTROLLER, GaitChoice
+from hexapod_cosim.cosim.run.designs import StanceChange, kept_stance
 from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.reach import reaches
 from hexapod_cosim.cosim.scenario.reading import scenario_robot
@@ -98,14 +98,15 @@ def select_gait(
     robot = _with_servo(bare, own.servo, own.gravity)
     settings = dict(scenario.settings.get("gait", {}))
     plain = GaitSelection(robot=robot, gait=make_gait(robot, **settings), stance=OWN)
-    if scenario.walk.stance != CHOSEN:
-        if scenario.names_walk:
-            return _named(scenario, plain, bare)
+    if scenario.stance != CHOSEN:
         control = control_of(scenario.control)
+        if scenario.names_walk:
+            named = _named(scenario, plain, bare)
+            return named if control.is_builtin else replace(named, chosen_by=OWN_CONTROLLER)
         if control.kind == FMU and control.path is not None:
             return _of_fmu(plain, control.path)
         if not control.chooses:
-            return replace(plain, chosen_by=BY_ROBOT)
+            return replace(plain, chosen_by=BY_ROBOT if control.is_builtin else OWN_CONTROLLER)
         plain = replace(plain, chosen_by=BY_CONTROL)
     chosen = _chosen(scenario.commands, plain, bare, settings)
     if plain.chosen_by == BY_CONTROL and _designed_for(gains, plain.robot, chosen.robot):
@@ -126,7 +127,7 @@ def _of_fmu(plain: GaitSelection, path: Path) -> GaitSelection:
     """Returns the walk with stance and gait of a controller FMU, as far as it has them."""
     found = walk_of_fmu(path)
     gait = make_gait(plain.robot, **found.gait) if found.gait else plain.gait
-    own = replace(plain, gait=gait, chosen_by=BY_CONTROL if found.gait else BY_ROBOT)
+    own = replace(plain, gait=gait, chosen_by=BY_CONTROL if found.gait else OWN_CONTROLLER)
     if found.stance is None or np.array_equal(found.stance, plain.robot.stance):
         return own
     legs = tuple(
@@ -138,7 +139,7 @@ def _of_fmu(plain: GaitSelection, path: Path) -> GaitSelection:
 
 def _named(scenario: Scenario, plain: GaitSelection, bare: Robot) -> GaitSelection:
     """Returns the walk with the stance that the scenario names; `bare` is the robot file's."""
-    stance = scenario.walk.stance
+    stance = scenario.stance
     if stance is None or stance == OWN:
         return plain
     if isinstance(stance, str):
@@ -188,7 +189,7 @@ def _chosen(
 def _narrowing(
     walk: GaitSelection,
     begin: GaitSelection,
-    design: Stance,
+    design: StanceChange,
     plain: GaitSelection,
     commands: Sequence[Command],
 ) -> GaitSelection:
@@ -247,16 +248,16 @@ def _designed_for(gains: Gains | None, own: Robot, chosen: Robot) -> bool:
 
 
 @lru_cache(maxsize=64)
-def _design(robot: Robot, gait: Gait) -> Stance:
+def _design(robot: Robot, gait: Gait) -> StanceChange:
     """Returns the stance of least heat of a robot file, designed once and kept in the user's
     cache.
     """
     return kept_stance(robot, gait, _found)
 
 
-def _found(robot: Robot, gait: Gait) -> Stance:
+def _found(robot: Robot, gait: Gait) -> StanceChange:
     design = find_stance(robot, gait=gait)
-    return Stance(design.outward, design.deeper)
+    return StanceChange(design.outward, design.deeper)
 
 
 def known_robot(scenario: Scenario) -> Robot:

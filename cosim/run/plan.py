@@ -70,13 +70,19 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> RunPlan:
 def chosen_gains(scenario: Scenario, given: Gains | None = None) -> Gains | None:
     """Returns the gains that a scenario runs with, None unless its control needs gains.
 
-    They are the given ones, or else designed for its robot and macro-step. Raises GainsError when
+    They are the given ones, or else designed for its robot and macro-step; those in [gains] of the
+    scenario replace them. Raises GainsError when
     no gains can be designed, HexapodError for a robot that cannot be read.
     """
     control = control_of(scenario.control)
     if not control.is_builtin or control.name == "kinematic":
         return None
-    return designed_gains(*design_key(scenario)) if given is None else given
+    gains = designed_gains(*design_key(scenario)) if given is None else given
+    changes = {
+        part: replace(getattr(gains, part), **dict(values))
+        for part, values in scenario.gains.items()
+    }
+    return replace(gains, **changes) if changes else gains
 
 
 def law_of(control: str) -> str:

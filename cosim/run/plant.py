@@ -12,8 +12,7 @@ from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.common.plant_files import binary, fmi2_platform
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant import export_fmu
-from hexapod_cosim.cosim.interface.plant import plant_roots
-from hexapod_cosim.cosim.interface.start_values import parameter_values
+from hexapod_cosim.cosim.interface.plant import parameter_values, plant_roots
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.results.ground import is_on_surface, surface_of_grid
 from hexapod_cosim.cosim.run.plan import RunPlan
@@ -36,9 +35,12 @@ SAME = 1e-9  # relative, of a parameter that was printed and read again
 
 @lru_cache(maxsize=MAX_FMUS)
 def _content(robot: Robot, _binary: Path, _changed: int) -> bytes:
-    """Returns the plant FMU of a robot with a binary, which was changed at that time [ns]."""
+    """Returns the plant FMU of a robot with a binary, which was changed at that time [ns].
+
+    It holds what a run reads, without documentation, pictures and sources.
+    """
     with TemporaryFolder("export") as folder:
-        return export_fmu(robot, folder / f"{robot.name}.fmu").read_bytes()
+        return export_fmu(robot, folder / f"{robot.name}.fmu", bare=True).read_bytes()
 
 
 class PlantFmus:

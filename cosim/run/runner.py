@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
+from dataclasses import replace
 from pathlib import Path
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
 from hexapod_cosim.cosim.control.controllers import (
     connection_of,
-    control_facts,
     fmu_parameters_of,
 )
 from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
@@ -30,7 +30,7 @@ from hexapod_cosim.cosim.master.loop import Progress
 from hexapod_cosim.cosim.master.native_loop import NativeMaster
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, chosen_columns
 from hexapod_cosim.cosim.master.sensors import errors_of
-from hexapod_cosim.cosim.results.facts import Result
+from hexapod_cosim.cosim.results.facts import COMPILED, Result
 from hexapod_cosim.cosim.results.metrics import metric_columns
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
 from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
@@ -41,10 +41,9 @@ from hexapod_cosim.cosim.run.plant import (
     run_surface,
 )
 from hexapod_cosim.cosim.run.single_run import make_result, simulate, start_controller
-from hexapod_cosim.cosim.scenario.controls import FMU, control_of
+from hexapod_cosim.cosim.scenario.controls import FMU, PYTHON, control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, Robot
-from hexapod_cosim.models.friction import BRISTLE_LAWS
 
 MAX_SETTINGS = 64  # robots whose settings are kept
 
@@ -95,9 +94,9 @@ class Runner(Closing):
         """Runs a scenario, on the plant FMU `fmu` and with `gains` if given.
 
         Arguments are those of run.simulate(), which runs on the loop in Python what the loop in C
-        cannot: a controller in Python, an FMU of FMI 3.0 or with Boolean inputs, and a built-in
-        control whose sensors read NaN, which FMUs refuse. Raises HexapodError when the run cannot
-        start; how a run that started ended is in the result.
+        cannot: a controller in Python, and with a warning an FMU of FMI 3.0 or with Boolean inputs
+        and a built-in control whose sensors read NaN, which FMUs refuse. Raises HexapodError when
+        the run cannot start; how a run that started ended is in the result.
         """
         control = control_of(scenario.control)
         path = self._fmus.fmu(scenario.robot) if fmu is None else fmu
@@ -115,7 +114,13 @@ class Runner(Closing):
                 connection = connection_of(control, given.described, scenario, plan.controller)
                 if connection.is_scalar and isinstance(given, Fmu):
                     return self._simulate_fmu(plan, path, given, connection, progress, begin)
-        return simulate(scenario, fmu=path, gains=gains, progress=progress, begin=begin)
+        result = simulate(scenario, fmu=path, gains=gains, progress=progress, begin=begin)
+        if control.kind == PYTHON:
+            return result
+        what = "sensors that read NaN" if control.is_builtin else "FMI 3.0 and Boolean inputs"
+        text = f"the run used the loop in Python: that in C does not support {what}"
+        facts = replace(result.facts, warnings=(text, *result.facts.warnings))
+        return replace(result, facts=facts)
 
     def _simulate_fmu(
         self,
@@ -174,7 +179,7 @@ class Runner(Closing):
             outcome,
             plant,
             parameters,
-            controller=control_facts(scenario),
+            engine=COMPILED,
             warnings=[*plan.controller.warnings, *warnings],
             surface=surface,
         )
@@ -210,9 +215,7 @@ class Runner(Closing):
 
     def _columns(self, plan: RunPlan) -> tuple[str, ...] | None:
         """Returns the columns to record; None for all."""
-        bristles = (
-            plan.robot.friction.law in BRISTLE_LAWS or "friction.law" in plan.scenario.parameters
-        )
+        bristles = plan.robot.friction.has_bristles or "friction.law" in plan.scenario.parameters
         return None if self._everything else metric_columns(bristles=bristles)
 
     def _controller_for(self, plan: RunPlan) -> Fmu:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import version
@@ -31,9 +31,10 @@ from hexapod_cosim.cosim.master.loop import (
 from hexapod_cosim.cosim.master.recorder import Recorder, chosen_columns
 from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.results.facts import FmuIdentity, Result, RobotIdentity, RunFacts
+from hexapod_cosim.cosim.results.facts import PYTHON, FmuIdentity, Result, RobotIdentity, RunFacts
 from hexapod_cosim.cosim.results.locomotion import (
     describe_fall,
+    found_faults,
     is_sent_ahead,
     locomotion_of,
     missed_end,
@@ -95,24 +96,11 @@ def simulate(
             start_controller(controller, plant, plan)
         if begin is not None:
             begin()
-        outcome = run(
-            plant,
-            signals,
-            controller,
-            plan.schedule,
-            recorder,
-            h=scenario.macro_step,
-            progress=progress,
-        )
-        return make_result(
-            plan,
-            outcome,
-            plant,
-            parameters,
-            controller=control_facts(scenario, law),
-            warnings=controller.warnings,
-            surface=run_surface(plant, plan.robot, parameters),
-        )
+        parts = plant, signals, controller, plan.schedule, recorder
+        outcome = run(*parts, h=scenario.macro_step, progress=progress)
+        surface = run_surface(plant, plan.robot, parameters)
+        facts = {"engine": PYTHON, "law": law, "warnings": controller.warnings}
+        return make_result(plan, outcome, plant, parameters, surface=surface, **facts)
 
 
 def start_controller(controller: FmuLaw, plant: Fmu, plan: RunPlan) -> None:
@@ -141,36 +129,39 @@ def _make_recorder(plan: RunPlan, signals: Signals, controller: JointController)
     return recorder
 
 
+def _events(scenario: Scenario, outcome: Outcome) -> tuple[dict[str, Any], ...]:
+    """Returns the events of the scenario and those that the controller found, in order of time."""
+    events = [*event_log(scenario, outcome.simulated), *found_faults(outcome.judged)]
+    return tuple(sorted(events, key=lambda event: float(event["time"])))
+
+
 def make_result(
     plan: RunPlan,
     outcome: Outcome,
     plant: Fmu,
     parameters: Mapping[str, float],
     *,
-    controller: Mapping[str, Any],
+    engine: str,
+    law: Any = None,
     warnings: Sequence[str] = (),
     surface: Surface | None = None,
 ) -> Result:
     """Returns the result of a run, with its metrics and warnings.
 
-    controller: facts of the controller; warnings: its own; surface: the run's, for reports.
+    engine: that ran it; law: the controller object, if one was given; warnings: the controller's;
+    surface: the run's, for reports.
     """
-    scenario, setup, drawn = plan.scenario, plan.controller, plan.drawn
+    scenario, setup = plan.scenario, plan.controller
     view = View(outcome.judged, parameters, setup.gait.period)
-    missing = list[str]()
     fall = describe_fall(view, setup.robot)
-    if outcome.status == COMPLETED:
-        missing = short_run_warnings(view)
-        # a drop neither walks nor swings a foot
-        missing += [] if is_drop(view.recording) else missing_metrics_warnings(view)
     metrics = compute_metrics(view, servo=plan.robot.servo, realtime_factor=outcome.realtime_factor)
     arrives = outcome.status != COMPLETED or not is_sent_ahead(view)
-    missed = "" if arrives else missed_end(metrics)
     facts = RunFacts(
         status=outcome.status,
         reason=outcome.reason,
         title=scenario.title,
         control=control_of(scenario.control).label,
+        engine=engine,
         simulated=outcome.simulated,
         wall=outcome.wall,
         realtime_factor=outcome.realtime_factor,
@@ -180,25 +171,31 @@ def make_result(
         fmu=FmuIdentity(file=plant.path.name, guid=plant.description.guid, sha256=plant.sha256),
         versions=dict(_versions()),
         platform=f"{sys.platform} {platform.machine()}",
-        controller=controller,
-        warnings=(
-            *warnings,
-            *unused_settings(scenario, setup.robot),
-            *([fall] if fall else []),
-            *walk_warnings(view, setup.robot),
-            *off_map_warnings(view.recording, surface_of(plan.robot.terrain)),
-            *heat_warnings(view.recording, plan.robot.servo),
-            *missing,
-        ),
-        events=tuple(event_log(scenario, outcome.simulated)),
+        controller=control_facts(scenario, law),
+        warnings=(*warnings, *_warnings(plan, outcome, view, fall)),
+        events=_events(scenario, outcome),
         gains=None if setup.gains is None else setup.gains.as_facts(),
-        walk=locomotion_of(view, upright=not fall, missed=missed),
-        drawn=None if drawn is None else drawn.as_facts(),
+        walk=locomotion_of(view, upright=not fall, missed="" if arrives else missed_end(metrics)),
+        drawn=None if plan.drawn is None else plan.drawn.as_facts(),
         walking=plan.selection.as_facts(),
         terrain={} if surface is None else dict(surface.recipe),
         parameters=dict(parameters),
     )
     return Result(scenario=scenario, outcome=outcome, metrics=metrics, facts=facts, surface=surface)
+
+
+def _warnings(plan: RunPlan, outcome: Outcome, view: View, fall: str) -> Iterator[str]:
+    """Yields the warnings of a run; `fall` describes its fall, "" without one."""
+    robot = plan.controller.robot
+    yield from unused_settings(plan.scenario, robot)
+    yield from [fall] if fall else []
+    yield from walk_warnings(view, robot)
+    yield from off_map_warnings(view.recording, surface_of(plan.robot.terrain))
+    yield from heat_warnings(view.recording, plan.robot.servo)
+    if outcome.status == COMPLETED:
+        yield from short_run_warnings(view)
+        # a drop neither walks nor swings a foot
+        yield from [] if is_drop(view.recording) else missing_metrics_warnings(view)
 
 
 @cache

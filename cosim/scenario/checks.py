@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 
 from hexapod_cosim.controller import Parts
 from hexapod_cosim.cosim.interface.plant import load_interface
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.cosim.scenario.records import (
     MAX_STEPS,
     SETTINGS,
@@ -17,6 +18,7 @@ from hexapod_cosim.cosim.scenario.records import (
     Sensors,
     Variation,
 )
+from hexapod_cosim.cosim.scenario.sections import GAINS
 from hexapod_cosim.models import Robot, ScenarioError, load_robot, nearest_name
 from hexapod_cosim.models.ground.table import terrain_specs
 from hexapod_cosim.models.schema import specs
@@ -85,7 +87,7 @@ def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
 
     `given` are the names set with --set, for the messages. Raises ScenarioError.
     """
-    if not scenario.parameters:
+    if not scenario.parameters and not scenario.tunings:
         return
     interface = load_interface(load_robot(scenario.robot))
     known = [entry.name for entry in interface.of_causality("parameter")]
@@ -94,6 +96,7 @@ def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
         for entry in interface.variables
         if entry.causality in {"input", "output"}
     }
+    _check_tunings(scenario, interface)
     for name, value in scenario.parameters.items():
         if name in known:
             continue
@@ -113,6 +116,17 @@ def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
                 where=where,
             )
         raise _unknown("parameter", name, known, "a parameter", where=where)
+
+
+def _check_tunings(scenario: Scenario, interface: Interface) -> None:
+    """Checks that events change tunable parameters. Raises ScenarioError."""
+    tunable = [entry.name for entry in interface.variables if entry.variability == "tunable"]
+    for event in scenario.tunings:
+        if event.parameter not in tunable:
+            where = f"{scenario.where}: events"
+            raise _unknown(
+                "tunable parameter", event.parameter, tunable, "a tunable one", where=where
+            )
 
 
 def _not_a_parameter(name: str, causality: str, where: str) -> ScenarioError:
@@ -145,4 +159,5 @@ def setting_names() -> list[str]:
         if section != "terrain" and key not in UNUSED.get(section, ())
     ]
     keys += [("walk", key) for key in WALK_KEYS]
+    keys += [("gains", f"{part}.{key}") for part, kind in GAINS.items() for key in specs(kind)]
     return [f"{section}.{key}" for section, key in keys]

@@ -19,6 +19,7 @@ from hexapod_cosim.cosim.scenario.records import (
     Scenario,
     SensorFault,
     ServoFault,
+    Tuning,
 )
 from hexapod_cosim.models import ScenarioError
 from hexapod_cosim.models.schema import (
@@ -60,10 +61,10 @@ def read_events(value: Any) -> tuple[Event, ...]:
 
 
 def _read_event(table: Any, where: str) -> Event:
-    """Reads an event, whose keys say what it is: `lost`, `sensor` (angle or attitude), `joint` (of
-    a servo), `leg` or `fault` (of a force sensor), or else a push.
+    """Reads an event, whose keys say what it is: `lost`, `parameter`, `sensor` (angle or
+    attitude), `joint` (of a servo), `leg` or `fault` (of a force sensor), or else a push.
     """
-    kinds = (Push, Fault, AngleFault, AttitudeFault, ServoFault, Lost)
+    kinds = (Push, Fault, AngleFault, AttitudeFault, ServoFault, Lost, Tuning)
     known = [key for kind in kinds for key in specs(kind)]
     refuse_unknown_keys(expect_table(table, where), list(dict.fromkeys(known)), where)
     event: Event = read_record(_kind_of_event(table, f"{where}.sensor"), table, where)
@@ -75,6 +76,8 @@ def _kind_of_event(table: Mapping[str, Any], where: str) -> type[Event]:
     """Returns the record that the keys of an event belong to; `where` names its sensor."""
     if "lost" in table:
         return Lost
+    if "parameter" in table:
+        return Tuning
     if "sensor" in table:
         sensor = Choice((ANGLE, ATTITUDE)).read(table["sensor"], where)
         return AngleFault if sensor == ANGLE else AttitudeFault
@@ -125,6 +128,8 @@ def describe_event(event: Event) -> str:
             text = f"the {which} {SERVO_TEXTS[event.fault].format(share=event.share)}"
         case Lost():
             text = LOST_TEXTS[event.lost]
+        case Tuning():
+            return f"{event.parameter} becomes {event.value:g}"
     return text if math.isinf(event.duration) else f"{text}, for {event.duration:g} s"
 
 

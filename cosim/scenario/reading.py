@@ -37,13 +37,13 @@ from hexapod_cosim.cosim.scenario.records import (
 from hexapod_cosim.cosim.scenario.sections import (
     errors_of,
     read_commands,
+    read_gains,
     read_gravity,
     read_setting,
-    read_walk,
+    read_stance,
 )
 from hexapod_cosim.cosim.scenario.tables import read_tables, with_overrides
 from hexapod_cosim.models import Robot, ScenarioError, load_robot
-from hexapod_cosim.models.friction import STATIC_LAWS
 from hexapod_cosim.models.ground.faces import ground_normal
 from hexapod_cosim.models.ground.table import merged_terrain
 from hexapod_cosim.models.records import Terrain
@@ -92,7 +92,8 @@ def scenario_from_table(
             commands=read_commands(table.get("command", {}), "command"),
             events=read_events(table.get("events", [])),
             sensors=read_record(Sensors, table.get("sensors", {}), "sensors"),
-            walk=read_walk(table.get("walk", {}), "walk"),
+            stance=read_stance(table.get("walk", {}), "walk"),
+            gains=read_gains(table.get("gains", {}), "gains"),
             compliance=read_record(Parts, table.get("compliance", {}), "compliance"),
             variation=read_record(Variation, table["variation"], "variation")
             if "variation" in table
@@ -141,7 +142,7 @@ def scenario_robot(scenario: Scenario) -> Robot:
     changes["terrain"] = scenario_terrain(scenario, own)
     friction = changes.get("friction", own.friction)
     if "mu_static" not in scenario.settings.get("friction", {}) and (
-        friction.law not in STATIC_LAWS or friction.mu_static < friction.mu
+        not friction.has_friction or friction.mu_static < friction.mu
     ):
         # the robot file's mu_static belongs to another law or to a smaller mu
         changes["friction"] = replace(friction, mu_static=0.0)

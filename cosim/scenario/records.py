@@ -128,7 +128,7 @@ class ServoFault:
     """A fault of a joint's servo from `time` [s from the start of the run].
 
     A weak servo gives a share of its largest torque, a limp one none; a locked joint stays at the
-    angle that it has when the fault begins (the plant's inputs `strength` and `lock`).
+    angle that it has when the fault begins (the plant's inputs `weakness` and `lock`).
     """
 
     time: Annotated[float, Number("s", at_least=0.0)]
@@ -153,8 +153,17 @@ class Lost:
     lost: Annotated[str, Choice(LOST)]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """A tunable parameter of the plant FMU that has a new value from `time` [s from the start]."""
+
+    time: Annotated[float, Number("s", at_least=0.0)]
+    parameter: Annotated[str, Text()]
+    value: Annotated[float, Number("")]
+
+
 SensorFault = Fault | AngleFault | AttitudeFault
-Event = Push | SensorFault | ServoFault | Lost
+Event = Push | SensorFault | ServoFault | Lost | Tuning
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,16 +199,6 @@ STANCE_CHANGE = Vector("m", 2)
 WALK_KEYS = ("stance",)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Walk:
-    """The stance that a scenario names: what the walk is, besides the gait in [gait]."""
-
-    # OWN: of the robot file. DESIGNED: that of `hexapod design --stance` for the gait. CHOSEN: that
-    # which compliant control chooses, with its gait unless [gait] names one. Two lengths: by which
-    # the feet stand further out from the hips, and deeper below them [m]. None: not named
-    stance: str | tuple[float, float] | None = None
-
-
 def default_formats() -> tuple[str, ...]:
     """Returns the formats of recordings: CSV, and Parquet if the extra `parquet` is installed."""
     return ("parquet", "csv") if has_pyarrow() else ("csv",)
@@ -232,12 +231,17 @@ class Scenario:
     macro_step: Annotated[float, Number("s", above=0.0, at_most=0.1)] = DEFAULT_PERIOD
     seed: Annotated[int, Whole()] = 0
     gravity: tuple[float, float, float] | None = None  # m/s2    None: the robot's own
-    walk: Walk = Walk()
+    # OWN: of the robot file. DESIGNED: that of least heat for the gait. CHOSEN: that of compliant
+    # control, with its gait unless [gait] names one. Two lengths: by which the feet stand further
+    # out from the hips, and deeper below them [m]. None: not named
+    stance: str | tuple[float, float] | None = None  # key of [walk]
     settings: Mapping[str, Mapping[str, Any]]  # differences from the robot file, by section
     commands: tuple[Command, ...]  # in order of time
     events: tuple[Event, ...] = ()
     sensors: Sensors = Sensors()
     compliance: Parts = ALL_PARTS  # active parts of the compliant control
+    # gains that replace designed ones, by part and name, as in a gains file
+    gains: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     variation: Variation | None = None  # None: the file has no such section
     outputs: Outputs = Outputs()
     parameters: Mapping[str, Any]  # further FMU parameters by name
@@ -257,7 +261,7 @@ class Scenario:
     def names_walk(self) -> bool:
         """Whether the scenario names a gait, its timing or a stance; else the control chooses."""
         timing = {"name", "period", "duty"} & set(self.settings.get("gait", {}))
-        return bool(timing) or self.walk.stance is not None
+        return bool(timing) or self.stance is not None
 
     @property
     def pushes(self) -> tuple[Push, ...]:
@@ -285,6 +289,12 @@ class Scenario:
         return tuple(event for event in self.events if isinstance(event, ServoFault))
 
     @property
+    def tunings(self) -> tuple[Tuning, ...]:
+        """The events that change parameters, in order of time."""
+        found = [event for event in self.events if isinstance(event, Tuning)]
+        return tuple(sorted(found, key=lambda event: event.time))
+
+    @property
     def lost(self) -> tuple[Lost, ...]:
         """The events that are lost commands or dropped macro-steps."""
         return tuple(event for event in self.events if isinstance(event, Lost))
@@ -295,8 +305,8 @@ class Scenario:
         plain = {key: getattr(self, key) for key in names if key in ("control", *PLAIN_KEYS)}
         plain |= {} if self.gravity is None else {"gravity": list(self.gravity)}
         tables = {key: dict(value) for key, value in self.settings.items() if value}
-        if self.walk.stance is not None:
-            named = self.walk.stance
+        if self.stance is not None:
+            named = self.stance
             tables["walk"] = {"stance": named if isinstance(named, str) else list(named)}
         if self.control_settings:  # a table, which stands behind the plain keys
             tables["control"] = {"law": plain.pop("control"), **self.control_settings}
@@ -305,6 +315,7 @@ class Scenario:
             "events": [_as_table(entry) for entry in self.events],
         }
         tail = {"sensors": _as_table(self.sensors), "compliance": _as_table(self.compliance)}
+        tail |= {"gains": {part: dict(values) for part, values in self.gains.items()}}
         tail |= {"variation": {} if self.variation is None else _as_table(self.variation)}
         tail |= {"outputs": _as_table(self.outputs), "parameters": dict(self.parameters)}
         return (
@@ -317,7 +328,17 @@ class Scenario:
 
 PLAIN_KEYS = tuple(specs(Scenario))  # title, robot, start, duration, macro_step, seed
 SECTIONS = (
-    *("command", "control", "walk", "sensors", "compliance", "variation", "outputs", "parameters"),
+    *(
+        "command",
+        "control",
+        "walk",
+        "sensors",
+        "compliance",
+        "gains",
+        "variation",
+        "outputs",
+        "parameters",
+    ),
     *SETTINGS,
 )
 KEYS = (*PLAIN_KEYS, "gravity", "events", *SECTIONS)

@@ -28,8 +28,8 @@ from hexapod_cosim.cosim.scenario.records import (
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 ROUND_OFF = 5e-10  # s    of the time of a macro-step
-# strength and lock
-LIMP, LOCKED = (0.0, 0.0), (1.0, 1.0)
+# weakness and lock
+LIMP, LOCKED = (1.0, 0.0), (0.0, 1.0)
 SERVO_STATES = {"limp": LIMP, "dead": LIMP, "locked": LOCKED, "stuck": LOCKED}
 STUCK = FAULTS.index("stuck") + 1  # the kind of a sensor that repeats its last reading
 
@@ -54,12 +54,14 @@ class Schedule:
     # (steps, 6) force [N] and torque [N m] on the torso, world axes; None: no pushes
     pushes: NDArray[np.float64] | None
     faults: SensorFaults | None  # of the feet's force sensors, in the order of the legs
-    # (steps, 36) the plant's inputs strength, then lock, leg by leg; None: healthy servos
+    # (steps, 36) the plant's inputs weakness, then lock, leg by leg; None: healthy servos
     servos: NDArray[np.float64] | None = None
     lost: NDArray[np.bool_] | None = None  # (steps + 1,) the command is lost; None: none are
     # of the joints' sensors (18, leg by leg), of the attitude sensor (1)
     angle_faults: SensorFaults | None = None
     attitude_faults: SensorFaults | None = None
+    # parameters that change: the step before which they do, name and value, in order
+    tunings: tuple[tuple[int, str, float], ...] = ()
 
     @cached_property
     def commands(self) -> tuple[BodyCommand, ...]:
@@ -93,6 +95,10 @@ def make_schedule(scenario: Scenario) -> Schedule:
         lost_rows(scenario.lost, times) if scenario.lost else None,
         angle,
         attitude,
+        tuple(
+            (int(np.searchsorted(begins, event.time - ROUND_OFF)), event.parameter, event.value)
+            for event in scenario.tunings
+        ),
     )
 
 
@@ -157,13 +163,12 @@ def _sensor(fault: SensorFault) -> int:
 
 
 def servo_rows(faults: Sequence[ServoFault], times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns strength and lock of all servos in the steps that begin at times [s from the start]
+    """Returns weakness and lock of all servos in the steps that begin at times [s from the start]
     (times, 36). Where faults of a servo overlap, the last one in the list holds.
     """
     rows = np.zeros((len(times), 2, len(LEG_NAMES), len(JOINT_NAMES)))
-    rows[:, 0] = 1.0
     for fault in faults:
-        state = SERVO_STATES.get(fault.fault, (fault.share, 0.0))
+        state = SERVO_STATES.get(fault.fault, (1.0 - fault.share, 0.0))
         for j, joint in enumerate(JOINT_NAMES):
             if fault.joint in (joint, WHOLE_LEG):
                 rows[_span(fault, times), :, LEG_NAMES.index(fault.leg), j] = state

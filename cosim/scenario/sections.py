@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from hexapod_cosim.controller.gains import SECTIONS
 from hexapod_cosim.cosim.scenario.records import (
     GRAVITY,
     GRAVITY_VECTOR,
@@ -18,7 +19,6 @@ from hexapod_cosim.cosim.scenario.records import (
     UNUSED,
     WALK_KEYS,
     Command,
-    Walk,
 )
 from hexapod_cosim.models import RobotError, ScenarioError
 from hexapod_cosim.models.ground.table import read_keys
@@ -33,6 +33,9 @@ from hexapod_cosim.models.schema import (
 )
 from hexapod_cosim.models.servos.presets import servo_table
 from hexapod_cosim.models.soil.presets import soil_table
+
+# the parts of a gains file that a controller reads
+GAINS = {part: SECTIONS[part] for part in ("support", "hold", "limits", "paper")}
 
 
 @contextmanager
@@ -62,14 +65,14 @@ def read_setting(name: str, table: Any, where: str) -> dict[str, Any]:
     return read_given(record, table, where)
 
 
-def read_walk(table: Any, where: str) -> Walk:
+def read_stance(table: Any, where: str) -> str | tuple[float, float] | None:
     """Reads [walk]: the stance by its name, or as two lengths."""
     refuse_unknown_keys(expect_table(table, where), list(WALK_KEYS), where)
     value, key = table.get("stance"), f"{where}.stance"
     if isinstance(value, list | tuple):
         outward, deeper = STANCE_CHANGE.read(value, key)
-        return Walk(stance=(outward, deeper))
-    return Walk(stance=None if value is None else Choice(STANCES).read(value, key))
+        return outward, deeper
+    return None if value is None else Choice(STANCES).read(value, key)
 
 
 def read_commands(value: Any, where: str) -> tuple[Command, ...]:
@@ -89,6 +92,14 @@ def read_commands(value: Any, where: str) -> tuple[Command, ...]:
             where=where,
         )
     return tuple(commands) if times and times[0] == 0.0 else (Command(), *commands)
+
+
+def read_gains(table: Any, where: str) -> dict[str, dict[str, Any]]:
+    """Reads [gains]: some of the gains of a gains file, by part and name."""
+    refuse_unknown_keys(expect_table(table, where), list(GAINS), where)
+    return {
+        part: read_given(GAINS[part], values, f"{where}.{part}") for part, values in table.items()
+    }
 
 
 def read_gravity(value: Any, where: str) -> tuple[float, float, float]:

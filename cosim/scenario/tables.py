@@ -113,6 +113,9 @@ def _set(table: dict[str, Any], name: str, value: Any) -> None:
         if section == "control" and isinstance(table.get(section), str):
             table[section] = {LAW: table[section]}
         inner = table.setdefault(section, {})
+        if section == "gains" and "." in key:  # gains.hold.path_rate
+            part, _, key = key.partition(".")
+            inner = inner.setdefault(part, {})
         if not isinstance(inner, dict):
             fix = f"set the whole list: --set '{section}=[...]'"
             raise ScenarioError(

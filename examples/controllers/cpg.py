@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
+from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.kinematics import foot_positions
 
@@ -30,7 +30,8 @@ class Cpg:
         coupling: float = 4.0,  # 1/s    of the oscillators
     ) -> None:
         self.period, self.frequency, self.lift, self.coupling = period, frequency, lift, coupling
-        self.stance = np.array(robot.stance)  # rad    (6, 3)
+        self.robot, self.stance = robot, np.array(robot.stance)  # rad    (6, 3)
+        self.diagnostics = Diagnostics()  # the plan, with which metrics compare the feet
         feet = foot_positions(robot, self.stance)  # m    (6, 3) torso frame
         hips = np.array([leg.hip_position for leg in robot.legs])
         self.beside = feet[:, 1]  # m    of each foot, to the left
@@ -48,6 +49,8 @@ class Cpg:
         angle = self.stance.copy()
         angle[:, 0] += LEFT * stride * np.cos(self.phase)
         angle[:, 1] += min(t, 1.0) * self.lift * np.maximum(np.sin(self.phase), 0.0)
+        self.diagnostics.planned[:] = foot_positions(self.robot, angle)
+        self.diagnostics.swinging[:] = np.sin(self.phase) > 0.0
         rates = (angle - self.angle) / self.period
         self.angle = angle
         return JointCommand(angle_ref=angle, speed_ref=rates)

@@ -20,10 +20,9 @@ from hexapod_cosim.cosim.cli.terminal import (
     show_json,
     show_table,
     show_text,
-    waiting,
     warn,
 )
-from hexapod_cosim.cosim.common.files import BENCHMARK, RUN_FILE, write_json
+from hexapod_cosim.cosim.common.files import RUN_FILE, write_json
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import COMPLETED
@@ -40,14 +39,17 @@ from hexapod_cosim.extensions.course.records import (
     load_course,
     read_entries,
 )
+from hexapod_cosim.extensions.course.report import write_course_report
 from hexapod_cosim.extensions.course.runs import Run, run_count, run_course
-from hexapod_cosim.extensions.course.store import read_table, write_result
+from hexapod_cosim.extensions.course.store import FILES, read_table, write_result
 from hexapod_cosim.extensions.course.table import Table
 
 EPILOG = (
     "A robot that falls or gets stuck is a result: it counts as a failure and is in no mean. "
     "Ctrl-C writes the table of the runs that are done."
 )
+
+BENCHMARK = "benchmark"  # kind of a folder with its result
 MAX_SEEDS = 1000
 OTHERS = tuple(name for name in CONTROLS if name != CHOOSER)
 DEFAULT = (*OTHERS, *(f"{name}{AT}{CHOSEN}" for name in OTHERS), CHOOSER)
@@ -118,7 +120,7 @@ def benchmark(
         "gains": gains,
     }
     command = _command_line(options, split=split, quick=quick)
-    with results_folder(output or Path("out") / BENCHMARK) as folder:
+    with results_folder(output or Path("out") / BENCHMARK, own=FILES) as folder:
         table, content, files = _run_into(
             folder, course, entries, given_gains(gains), workers, command
         )
@@ -166,22 +168,13 @@ def _run_into(
 def _write(
     table: Table, folder: Path, command: str, *, complete: bool
 ) -> tuple[dict[str, Any], list[Path]]:
-    """Writes result, picture and report; returns the content of benchmark.json and the files."""
-    # imported only here because matplotlib is slow to import
-    from hexapod_cosim.extensions.course.report import write_course_report  # noqa: PLC0415
-
+    """Writes result and report; returns the content of benchmark.json and the files."""
     content, files = write_result(table, folder, command=command, complete=complete)
-    with waiting("drawing the picture and the report"):
-        return content, [*files, *write_course_report(table, content, folder)]
+    return content, [*files, *write_course_report(table, content, folder)]
 
 
 def report_on(folder: Path) -> list[Path]:
-    """Writes picture and report of a benchmark's folder again; returns the files.
-
-    Raises HexapodError.
-    """
-    from hexapod_cosim.extensions.course.report import write_course_report  # noqa: PLC0415  slow
-
+    """Writes the report of a benchmark's folder again; returns its file. Raises HexapodError."""
     return write_course_report(*read_table(folder), folder)
 
 

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.controller.parts import SWITCHES
+from hexapod_cosim.controller.gains import SWITCHES
 from hexapod_cosim.cosim.results.metric_table import METRICS, PER_RADIAN
 from hexapod_cosim.cosim.scenario.controls import Control, parse_controls
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table

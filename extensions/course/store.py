@@ -11,15 +11,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.common.files import atomic_text, read_json, write_json, write_text
+from hexapod_cosim.cosim.common.files import atomic_text, read_json, write_json
 from hexapod_cosim.cosim.common.plant_files import package_version
 from hexapod_cosim.extensions.course.records import QUANTITIES, Case, CourseError, load_course
 from hexapod_cosim.extensions.course.runs import Run
 from hexapod_cosim.extensions.course.statistics import DRAWS
-from hexapod_cosim.extensions.course.table import Table, judge_parts
-from hexapod_cosim.extensions.course.texts import markdown
+from hexapod_cosim.extensions.course.table import Table
 
-RESULT, RUNS, TABLES = "benchmark.json", "runs.csv", "tables.md"
+RESULT, RUNS = FILES = ("benchmark.json", "runs.csv")
 FORMAT = 1
 METHODS = {  # how the intervals are made
     "success": "Wilson, 95 %",
@@ -54,14 +53,13 @@ def result_table(table: Table, *, command: str, complete: bool) -> dict[str, Any
         },
         "machine": {
             "platform": f"{sys.platform} {platform.machine()}",
-            "processor": processor(),
+            "processor": platform.processor() or platform.machine(),
         },
         "methods": METHODS,
         "quantities": {
             item.name: {"title": item.title, "unit": item.unit, "metric": item.metric}
             for item in QUANTITIES
         },
-        "parts": [each.as_table() for each in judge_parts(table)],
         "classes": _by_control(table.classes),
         "cases": {
             name: {**_case_table(case), "controls": controls}
@@ -83,16 +81,6 @@ def _by_control(figures: Mapping[tuple[str, str], Any]) -> dict[str, dict[str, A
 def _case_table(case: Case) -> dict[str, Any]:
     sweep = {"sweep": case.sweep, "height": case.height} if case.sweep else {}
     return {"class": case.kind, "about": case.about, **sweep, "scenario": case.scenario.to_table()}
-
-
-def processor() -> str:
-    """Returns the name of the processor."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or platform.machine()
 
 
 def write_runs(path: Path, runs: Sequence[Run]) -> None:
@@ -155,9 +143,8 @@ def _read_runs(path: Path) -> Iterator[Run]:
 def write_result(
     table: Table, folder: Path, *, command: str, complete: bool
 ) -> tuple[dict[str, Any], list[Path]]:
-    """Writes RESULT, RUNS and TABLES; returns the content of RESULT and the files."""
+    """Writes RESULT and RUNS; returns the content of RESULT and the files."""
     content = result_table(table, command=command, complete=complete)
     write_json(folder / RESULT, content)
     write_runs(folder / RUNS, table.runs)
-    write_text(folder / TABLES, markdown(table))
-    return content, [folder / RESULT, folder / RUNS, folder / TABLES]
+    return content, [folder / RESULT, folder / RUNS]

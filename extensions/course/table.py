@@ -1,10 +1,4 @@
-"""Condenses the runs of a course: figures of each case, medians over the cases of a class, and the
-parts of a control that pay.
-
-A part's effect on a figure is the ratio of the figure with the part to that without it, the median
-over the cases of a class. A part pays when it betters a figure of some class by GAIN and worsens
-none by LOSS. Success rates count as figures, in shares of all runs of a class.
-"""
+"""Condenses the runs of a course: figures of each case, and medians over the cases of a class."""
 
 from __future__ import annotations
 
@@ -22,15 +16,13 @@ from hexapod_cosim.cosim.results.comparison import Change, change_of, half_width
 from hexapod_cosim.cosim.results.metric_table import FLOORS
 from hexapod_cosim.cosim.scenario.controls import AT, CHOOSER, reference_of
 from hexapod_cosim.cosim.scenario.records import CHOSEN
-from hexapod_cosim.extensions.course.records import BY_NAME, QUANTITIES, SHOWN, Case, Course
+from hexapod_cosim.extensions.course.records import BY_NAME, QUANTITIES, Case, Course
 from hexapod_cosim.extensions.course.runs import Run
 from hexapod_cosim.extensions.course.statistics import Interval, Rate, median_ratio
 
 Array = NDArray[np.float64]
 
 ALL = "all"  # the class of all cases
-SUCCESS = "success"
-GAIN, LOSS = 0.1, 0.05
 LEAST_SHARE = 0.5  # of the pairs of a case that must be successes for its ratio to count
 
 
@@ -148,7 +140,10 @@ class Table:
         Compliant control, which walks in a gait and stance of its own choice, has a second column:
         against the reference in that gait and stance, if this was run.
         """
-        found = {label: (label, reference_of(label, self.controls)) for label in self.controls}
+        found = {
+            label: (label, self.parts.get(label) or reference_of(label, self.controls))
+            for label in self.controls
+        }
         twin = f"{self.reference}{AT}{CHOSEN}"
         if {CHOOSER, twin} <= set(self.controls):
             found[f"{CHOOSER} against {twin}"] = CHOOSER, twin
@@ -205,72 +200,3 @@ def _finite(values: Iterable[float]) -> Array:
     """Returns the finite ones of some values."""
     found = np.array(list(values), dtype=np.float64)
     return np.asarray(found[np.isfinite(found)])
-
-
-@dataclass(frozen=True)
-class Effect:
-    """The effect of a part on a figure of a class: a relative change, negative for the better."""
-
-    kind: str
-    quantity: str
-    change: float
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """A part of a control with its best and its worst effect."""
-
-    label: str  # of the column without the part
-    control: str  # with it
-    best: Effect
-    worst: Effect
-
-    @property
-    def pays(self) -> bool:
-        """Whether the part betters a figure by GAIN and worsens none by LOSS."""
-        return self.best.change <= -GAIN and self.worst.change < LOSS
-
-    def as_table(self) -> dict[str, Any]:
-        """Returns a table for JSON."""
-        effects = {
-            name: {"class": each.kind, "quantity": each.quantity, "change": each.change}
-            for name, each in (("best", self.best), ("worst", self.worst))
-        }
-        return {"label": self.label, "control": self.control, **effects, "pays": self.pays}
-
-
-def judge_parts(table: Table) -> list[Judgement]:
-    """Returns the judgements of the columns of a table that lack a part."""
-    found = []
-    for label, control in table.parts.items():
-        effects = effects_of(table, label, control)
-        if effects:
-            best = min(effects, key=lambda effect: effect.change)
-            worst = max(effects, key=lambda effect: effect.change)
-            found.append(Judgement(label, control, best, worst))
-    return found
-
-
-def effects_of(table: Table, label: str, control: str) -> list[Effect]:
-    """Returns the effects of the part that column `label` lacks and column `control` has."""
-    effects = []
-    for kind in dict.fromkeys(name for name, _ in table.classes if name != ALL):
-        whole = table.cases_of(kind, control)
-        without = table.cases_of(kind, label)
-        both = ClassFigures(
-            kind,
-            control,
-            tuple(
-                CaseFigures(one.case, control, one.runs, other.runs)
-                for one, other in zip(whole, without, strict=True)
-            ),
-        )
-        rates = (ClassFigures(kind, label, without).success, both.success)
-        before, after = (rate.interval.value for rate in rates)
-        ratios = {item.name: both.ratio(item.name).value - 1.0 for item in SHOWN}
-        effects += [
-            Effect(kind, name, change)
-            for name, change in {SUCCESS: before - after, **ratios}.items()
-            if math.isfinite(change)
-        ]
-    return effects

@@ -8,18 +8,10 @@ from collections.abc import Iterator, Mapping
 
 from hexapod_cosim.extensions.course.records import SHOWN, Quantity
 from hexapod_cosim.extensions.course.statistics import Interval, Rate
-from hexapod_cosim.extensions.course.table import (
-    ALL,
-    CaseFigures,
-    ClassFigures,
-    Effect,
-    Table,
-    judge_parts,
-)
+from hexapod_cosim.extensions.course.table import ALL, CaseFigures, ClassFigures, Table
 
 NUMBER = re.compile(r"[0-9.]*[0-9]")
 NONE = "-"  # where there is no value
-LEAST_SHOWN = 5e-3  # of an effect: a smaller change is 0 %
 LEAST_HALF = 5e-4  # of a mean: a narrower interval is not shown
 SCALES: Mapping[str, tuple[float, str]] = {  # shown value over the metric's, and its unit
     "slip": (1e3, "mm/m"),
@@ -144,27 +136,6 @@ def _alike(figures: CaseFigures) -> Iterator[tuple[str, int]]:
     yield from counts.values()
 
 
-def part_rows(table: Table) -> tuple[list[str], list[list[str]]]:
-    """Returns the table of parts: their best and worst effects, and whether they pay.
-
-    A part that betters or worsens nothing, in whole per cent, has "none" there.
-    """
-    rows = [
-        [
-            each.label,
-            _effect(each.best) if each.best.change < -LEAST_SHOWN else "none",
-            _effect(each.worst) if each.worst.change > LEAST_SHOWN else "none",
-            "pays" if each.pays else "does not pay",
-        ]
-        for each in judge_parts(table)
-    ]
-    return ["part", "best", "worst", ""], rows
-
-
-def _effect(effect: Effect) -> str:
-    return f"{100.0 * effect.change:+.0f} % {effect.quantity}, {effect.kind}"
-
-
 def sweep_rows(table: Table) -> tuple[list[str], list[list[str]]]:
     """Returns the successes over the heights of each sweep."""
     names = dict.fromkeys(case.sweep for case in table.course.cases if case.sweep)
@@ -182,7 +153,6 @@ def sweep_rows(table: Table) -> tuple[list[str], list[list[str]]]:
 def tables(table: Table) -> list[tuple[str, tuple[list[str], list[list[str]]]]]:
     """Returns titles and contents of all tables that are not empty."""
     every = [
-        ("Parts: best and worst effect on a class, and whether the part pays", part_rows(table)),
         (
             "Classes: success, and medians over cases of the change from the control that is named "
             "beside it (95 % interval)",
@@ -193,13 +163,3 @@ def tables(table: Table) -> list[tuple[str, tuple[list[str], list[list[str]]]]]:
         ("Failures", failure_rows(table)),
     ]
     return [(title, content) for title, content in every if content[1]]
-
-
-def markdown(table: Table) -> str:
-    """Returns all tables as a page in Markdown."""
-    parts = [f"Course {table.course.version}, split {table.course.split}, "
-             f"{len(table.course.seeds)} seeds."]  # fmt: skip
-    for title, (columns, rows) in tables(table):
-        lines = [columns, ["---"] * len(columns), *rows]
-        parts += [f"{title}:", "\n".join(f"| {' | '.join(line)} |" for line in lines)]
-    return "\n\n".join(parts) + "\n"

@@ -8,10 +8,8 @@ and writes.
 from __future__ import annotations
 
 import ctypes as ct
-import os
 import weakref
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,15 +17,17 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import DEFAULT_PERIOD
 from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
-from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.native_loop import step_functions
 from hexapod_cosim.cosim.master.sensors import MEASURED
 from hexapod_cosim.cosim.master.signals import COMMANDS, JOINT_COMMANDS, PUSH
+from hexapod_cosim.cosim.run.worker_pool import processor_count
 from hexapod_cosim.extensions.gym.checks import check_count, check_names, check_seeds, checked_mask
 from hexapod_cosim.extensions.gym.native import (
     ARRAYS,
+    AUTORESET,
     CALLS,
+    OUTPUTS,
     NativeArrays,
     NativeDraws,
     NativeFmu,
@@ -38,7 +38,6 @@ from hexapod_cosim.extensions.gym.native import (
 )
 from hexapod_cosim.extensions.gym.plants import (
     SPACING,
-    GroundMaps,
     export_base,
     export_plant,
     ground_maps,
@@ -46,28 +45,13 @@ from hexapod_cosim.extensions.gym.plants import (
     start_height,
     surfaces,
 )
-from hexapod_cosim.extensions.gym.render import frame
 from hexapod_cosim.extensions.gym.settings import BLOCKS, JOINTS, RATE, REASONS, TERMS, EnvSettings
 from hexapod_cosim.models import FmuError, HexapodError, Robot
 
-AUTORESET = ("next_step", "same_step", "disabled")  # hxAutoreset in C
 FAILED = REASONS.index("failed")
 MESSAGE_SIZE = 512
 STARTS = 20  # episodes in a row that a plant may refuse to start before a reset is an error
 GROUND = "terrain.grid"  # the parameter that chooses one of several grounds, from 1
-# outputs of the plant in the order of hxEnvPlace
-OUTPUTS = [
-    *MEASURED["angle"],
-    *MEASURED["speed"],
-    *MEASURED["foot_force"],
-    *MEASURED["quaternion"],
-    *MEASURED["angular_velocity"],
-    *joint_names("torque"),
-    *vector_names("torso.position"),
-    *vector_names("torso.velocity"),
-    *vector_names("torso.contact_force"),
-    *foot_names("slip_distance"),
-]
 Array = NDArray[Any]
 
 
@@ -97,8 +81,7 @@ class Batch(Closing):
         autoreset: str = "next_step",
     ) -> None:
         check_count("number of environments", count)
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-        self.threads = min(cores or 1, count) if threads is None else threads
+        self.threads = min(processor_count(), count) if threads is None else threads
         check_count("number of threads", self.threads)
         check_names([autoreset], "autoreset mode", AUTORESET)
         self.settings, self.count, self.autoreset = settings, count, autoreset
@@ -114,7 +97,7 @@ class Batch(Closing):
     def _open(self) -> None:
         """Exports and loads the FMUs, creates the environments and starts the threads."""
         robots = grounds(self.settings)
-        self.robot, self._robots = robots[0], robots
+        self.robot = robots[0]
         with TemporaryFolder("gym") as folder:
             fmus = self._owned.fmus
             fmus.append(Fmu(export_plant(robots, folder)))
@@ -195,18 +178,14 @@ class Batch(Closing):
         for place, name in enumerate(BLOCKS):
             native.observed[place][:] = np.broadcast_to(given.observation.get(name, 0.0), 3)
         if "heights" in given.observation:
-            native.ground = self._ground()
+            native.ground = self._ground(robots)
         if len(self._owned.fmus) > 1:
             self._add_controller(native)
         return native
 
-    @cached_property
-    def _maps(self) -> GroundMaps:
-        return ground_maps(self.settings, self._robots)
-
-    def _ground(self) -> Any:
+    def _ground(self, robots: Sequence[Robot]) -> Any:
         """Returns the heights that robots observe, as C reads them."""
-        maps, places = self._maps, self.settings.places
+        maps, places = ground_maps(self.settings, robots), self.settings.places
         names, number = self.drawn_names, GROUND
         count, rows, columns = maps.height.shape
         return NativeGround(
@@ -244,8 +223,9 @@ class Batch(Closing):
             drawn |= {"initial.position[3]": (height, height, False)}
             drawn |= {GROUND: (1.0, float(count), True)}
         self.drawn_names = tuple(drawn)
-        for name in drawn:
-            self._check_parameter(name)
+        for name, ends in self.settings.randomise.items():
+            for value in ends:  # refused at once, not at the start of an episode
+                self._owned.fmus[0].set_parameters({name: float(value)})
         low, high, whole = ([ends[place] for ends in drawn.values()] for place in range(3))
         return NativeDraws(
             reference=self._references(self._owned.fmus[0], self.drawn_names),
@@ -254,22 +234,6 @@ class Batch(Closing):
             whole=self._keep(whole, np.int32),
             count=len(drawn),
         )
-
-    def _check_parameter(self, name: str) -> None:
-        """Raises FmuError unless a name is a real parameter of the plant and may have the values
-        that are drawn for it.
-        """
-        ends = self.settings.randomise.get(name)
-        if ends is not None:
-            for value in ends:
-                self._owned.fmus[0].set_parameters({name: float(value)})
-        if name not in self._owned.fmus[0].names("parameter"):
-            raise FmuError(
-                "a parameter that cannot be drawn",
-                got=name,
-                expected="a parameter of the plant that is a real number",
-                fix="remove it from randomise",
-            )
 
     def reset(
         self, *, seeds: Sequence[int] | None = None, mask: NDArray[np.bool_] | None = None
@@ -321,11 +285,6 @@ class Batch(Closing):
         values = np.zeros(len(OUTPUTS))
         self._library.hx_environments_values(self._handle(), index, values.ctypes.data)
         return dict(zip(OUTPUTS, values.tolist(), strict=True))
-
-    def frame(self, index: int) -> NDArray[np.uint8]:
-        """Returns a picture (360, 480, 3) of an environment's robot on its ground."""
-        number = int(self.drawn(index).get(GROUND, 1.0)) - 1
-        return frame(self.robot, self._maps, number, self.values(index))
 
     def _handle(self) -> int:
         if self._owned.handle is None:

@@ -10,10 +10,17 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.gym.batch import Batch
-from hexapod_cosim.extensions.gym.settings import JOINTS, RATE, REASONS, TERMS, EnvSettings, changed
+from hexapod_cosim.extensions.gym.settings import (
+    JOINTS,
+    LARGEST,
+    RATE,
+    REASONS,
+    TERMS,
+    EnvSettings,
+    changed,
+)
 from hexapod_cosim.extensions.gym.settings import task as task_settings
 
-RENDER_MODES = ("rgb_array",)
 LARGEST_SEED = 2**32  # seeds are drawn below it
 
 
@@ -23,8 +30,13 @@ def action_space() -> spaces.Box[Any]:
 
 
 def observation_space(settings: EnvSettings) -> spaces.Box[Any]:
-    """Returns the space of one environment's observations."""
-    return spaces.Box(-np.inf, np.inf, (settings.size,), np.float32)
+    """Returns the space of one environment's observations, which C limits to LARGEST."""
+    largest = [
+        np.broadcast_to(np.minimum(np.abs(settings.observation[name]) * limit, LARGEST), size)
+        for name, (size, limit) in settings.blocks.items()
+    ]
+    high = np.concatenate(largest).astype(np.float32)
+    return spaces.Box(-high, high, dtype=np.float32)
 
 
 class HexapodEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -36,12 +48,9 @@ class HexapodEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     with the plant's `message`.
     """
 
-    metadata = {"render_modes": list(RENDER_MODES), "render_fps": RATE}  # noqa: RUF012
+    metadata = {"render_modes": [], "render_fps": RATE}  # noqa: RUF012
 
-    def __init__(
-        self, *, task: str = "Hexapod-v0", render_mode: str | None = None, **changes: Any
-    ) -> None:
-        self.render_mode = checked_render_mode(render_mode)
+    def __init__(self, *, task: str = "Hexapod-v0", **changes: Any) -> None:
         self.settings = changed(task_settings(task), changes)
         self.action_space = action_space()
         self.observation_space = observation_space(self.settings)
@@ -93,31 +102,9 @@ class HexapodEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
                 info["message"] = batch.message(0)
         return batch.observation[0].copy(), float(batch.reward[0]), terminated, truncated, info
 
-    def render(self) -> NDArray[np.uint8] | None:
-        """Returns a picture (360, 480, 3) of the robot, None without a render mode.
-
-        Raises ResetNeeded before the first reset.
-        """
-        if self.render_mode is None:
-            gymnasium.logger.warn('render: pass render_mode="rgb_array" to gymnasium.make')
-            return None
-        if not self._seeded:
-            raise gymnasium.error.ResetNeeded("render: the robot has no state yet; call reset")
-        return self._batch.frame(0)
-
     def close(self) -> None:
         """Frees the plant; may be called twice."""
         self._batch.close()
-
-
-def checked_render_mode(mode: str | None) -> str | None:
-    """Returns a render mode. Raises gymnasium.error.Error for an unknown one."""
-    if mode is not None and mode not in RENDER_MODES:
-        raise gymnasium.error.Error(
-            f"render_mode: got {mode!r}, expected None or 'rgb_array'; for the robot in 3D export "
-            "the policy and open the report of `hexapod simulate --control policy.fmu`"
-        )
-    return mode
 
 
 def checked(action: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:

@@ -4,9 +4,11 @@ from hexapod_cosim.cosim.cli.extension import Command, Extension
 
 GYM = Command(
     name="gym",
-    about="Train, measure and export policies for reinforcement learning.",
+    about="Train and export policies for reinforcement learning.",
     place="hexapod_cosim.extensions.gym.gym_command:app",
 )
 EXTENSION = Extension(
-    commands=[GYM], lists={"environments": "hexapod_cosim.extensions.gym.settings:environment_rows"}
+    commands=[GYM],
+    lists={"environments": "hexapod_cosim.extensions.gym.settings:environment_rows"},
+    interfaces=["hexapod_cosim.extensions.gym.policy:default_interface"],
 )

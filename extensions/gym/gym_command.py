@@ -1,4 +1,4 @@
-"""Defines the commands `hexapod gym train`, `hexapod gym bench` and `hexapod gym export`."""
+"""Defines the commands `hexapod gym train` and `hexapod gym export`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from hexapod_cosim.cosim.cli.options import Json
-from hexapod_cosim.cosim.cli.terminal import show_files, show_json
+from hexapod_cosim.cosim.cli.terminal import show_files, show_json, warn
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.export.plant import export_interface
 from hexapod_cosim.extensions.gym.policy import load_policy, load_policy_interface
@@ -25,7 +25,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
-    help="Train, measure and export policies for reinforcement learning.",
+    help="Train and export policies for reinforcement learning.",
 )
 
 
@@ -45,25 +45,11 @@ def train_policy(
     how = TrainSettings(minutes=minutes, generations=generations, seed=seed)
     settings = replace(training_settings(task(env)), robot=robot)
     with atomic_path(output) as part:  # refuses a bad place before the training
-        train(settings, how, (lambda _: None) if json else _show).save(part)
+        policy, rising = train(settings, how, (lambda _: None) if json else _show)
+        policy.save(part)
+    if rising:
+        warn("too little training: the returns were still rising; give more --minutes")
     _show_written(output, json=json)
-
-
-@app.command("bench")
-def measure(
-    envs: Annotated[int, typer.Option("--envs", help="Robots in the vector.")] = 64,
-    seconds: Annotated[float, typer.Option("--seconds", help="Of robot time.")] = 10.0,
-    json: Json = False,
-) -> None:
-    """Measure environment steps per second, with the error of the path."""
-    # imported here because it is needed here only
-    from hexapod_cosim.extensions.gym.bench import bench  # noqa: PLC0415
-
-    text = bench(count=envs, duration=seconds)
-    if json:
-        show_json({"lines": text.splitlines()})
-    else:
-        print(text)
 
 
 @app.command("export")

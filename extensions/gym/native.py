@@ -9,8 +9,10 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
+from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.loop_library import Header, load_loop, loop_header
+from hexapod_cosim.cosim.master.sensors import MEASURED
 
 # functions of an FMU by the members of hxEnvFmu
 CALLS = {
@@ -29,6 +31,20 @@ NativeFmu, NativeDraws = HEADER.types["hxEnvFmu"], HEADER.types["hxEnvDraws"]
 NativeGround, NativeSettings = HEADER.types["hxEnvGround"], HEADER.types["hxEnvSettings"]
 NativeArrays = HEADER.types["hxEnvArrays"]
 ARRAYS = tuple(name for name, _ in NativeArrays._fields_)
+AUTORESET = ("next_step", "same_step", "disabled")  # hxAutoreset
+# outputs of the plant in the order of hxEnvPlace
+OUTPUTS = [
+    *MEASURED["angle"],
+    *MEASURED["speed"],
+    *MEASURED["foot_force"],
+    *MEASURED["quaternion"],
+    *MEASURED["angular_velocity"],
+    *joint_names("torque"),
+    *vector_names("torso.position"),
+    *vector_names("torso.velocity"),
+    *vector_names("torso.contact_force"),
+    *foot_names("slip_distance"),
+]
 
 
 @cache

@@ -89,16 +89,6 @@ class GroundMaps:
     first: float  # m  x and y of the first node
     clearance: float  # m  height of the torso over level ground in the stance
 
-    def at(self, number: int, x: Array, y: Array) -> Array:
-        """Returns the heights [m] of the nodes of a ground, from 0, nearest to places [m]."""
-        last = self.height.shape[1] - 1
-        row, column = (
-            np.clip(np.round((place - self.first) / SPACING), 0, last).astype(int)
-            for place in (y, x)
-        )
-        heights: Array = self.height[number][row, column].astype(np.float64)
-        return heights
-
 
 def ground_maps(settings: EnvSettings, robots: Sequence[Robot]) -> GroundMaps:
     """Returns the heights of the grounds, in the order of their numbers in the plant's FMU.

@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.components import Component
 from hexapod_cosim.cosim.common.files import atomic_path
-from hexapod_cosim.cosim.interface.plant import Interface, expand_interface
+from hexapod_cosim.cosim.interface.plant import expand_interface
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.extensions.gym.settings import BLOCKS, JOINTS, MEASURABLE, RATE, EnvSettings
-from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, Robot
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, Robot, load_robot
 
 Array = NDArray[np.float64]
 INPUTS = sum(BLOCKS[name] for name in MEASURABLE)  # 29
@@ -45,6 +46,7 @@ POLICY = Component(
     prefix="policy_",
     structure="Policy",
     suffix="_policy",
+    package="hexapod_cosim.extensions.gym",
     description=(
         "Learned policy of a hexapod robot: angles of its {joints} joints from a body velocity and "
         "from measurements by a multilayer perceptron"
@@ -205,3 +207,8 @@ def load_policy_interface(policy: Policy, robot: Robot) -> Interface:
     settings = SimpleNamespace(period=1.0 / RATE, upright=UPRIGHT)
     roots = SimpleNamespace(robot=robot, policy=weights, settings=settings)
     return expand_interface(POLICY, robot, roots)
+
+
+def default_interface() -> Interface:
+    """Returns the interface of the default robot's policy that stands."""
+    return load_policy_interface(standing_policy("athena"), load_robot("athena"))

@@ -24,6 +24,7 @@ RATE = 50  # Hz  of actions
 MOST_PLACES = 10_000  # whose heights are observed
 BASES = ("stance", "kinematic", "compliant")  # what actions are added to
 
+LARGEST = 100.0  # of an observation's values (HX_ENV_LARGEST in C)
 # Blocks of an observation in their order, with their sizes (hxEnvBlock in C). The size of the
 # heights is the number of places that are scanned.
 BLOCKS: Mapping[str, int] = {
@@ -37,6 +38,8 @@ BLOCKS: Mapping[str, int] = {
     "clock": 2,
     "heights": 0,
 }
+# largest values before the scale, of blocks that have one
+LIMITS: Mapping[str, float] = {"gravity": 1.0, "action": 1.0, "clock": 1.0, "heights": 1.0}
 # Terms of the reward in their order (hxEnvTerm in C), with the names that legged_gym uses where it
 # has the term.
 TERMS = (
@@ -188,10 +191,18 @@ class EnvSettings:
             check(few, "scan_spacing", self.scan_spacing, f"at most {MOST_PLACES} places")
 
     @property
+    def blocks(self) -> dict[str, tuple[int, float]]:
+        """Sizes and largest values before the scale of the observed blocks, in their order."""
+        return {
+            name: (size or len(self.places), LIMITS.get(name, math.inf))
+            for name, size in BLOCKS.items()
+            if name in self.observation
+        }
+
+    @property
     def size(self) -> int:
         """Number of values in an observation."""
-        scanned = len(self.places) if "heights" in self.observation else 0
-        return scanned + sum(size for name, size in BLOCKS.items() if name in self.observation)
+        return sum(size for size, _ in self.blocks.values())
 
     @property
     def places(self) -> list[tuple[float, float]]:

@@ -8,8 +8,9 @@ the sum.
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -149,14 +150,28 @@ def ranks(values: Array) -> Array:
     return order / (len(values) - 1) - 0.5
 
 
-def train(settings: EnvSettings, how: TrainSettings, report: Report) -> Policy:
-    """Trains a policy until the time is over or all generations are done, and returns it.
+def still_rising(means: Sequence[float]) -> bool:
+    """Returns whether the mean returns of generations rise to the end.
 
-    Ctrl-C ends the training with the policy of the last whole generation; KeyboardInterrupt is
-    raised before the first one. Raises HexapodError for impossible settings of the environment.
+    The last quarter is compared with the one before; the rise must exceed two standard errors.
+    """
+    quarter = len(means) // 4
+    if quarter < 2:
+        return True
+    before, last = np.array(means[-2 * quarter : -quarter]), np.array(means[-quarter:])
+    error = math.sqrt((before.var(ddof=1) + last.var(ddof=1)) / quarter)
+    return float(last.mean() - before.mean()) > 2.0 * error
+
+
+def train(settings: EnvSettings, how: TrainSettings, report: Report) -> tuple[Policy, bool]:
+    """Trains a policy until the time is over or all generations are done.
+
+    Returns the policy, and whether more training would better it, see still_rising(). Ctrl-C ends
+    the training with the policy of the last whole generation; KeyboardInterrupt is raised before
+    the first one. Raises HexapodError for impossible settings of the environment.
     """
     begin, rng = time.monotonic(), np.random.default_rng(how.seed)
-    free, ascent = first_parameters(rng), Adam(how.rate)
+    free, ascent, means = first_parameters(rng), Adam(how.rate), list[float]()
     with Batch(settings, 2 * how.pairs, autoreset="disabled") as batch:
         try:
             for generation in range(how.generations):
@@ -165,11 +180,12 @@ def train(settings: EnvSettings, how: TrainSettings, report: Report) -> Policy:
                 found, way = returns(batch, policies, seed=generation)
                 weight = ranks(found)
                 free = free + ascent.step((weight[: how.pairs] - weight[how.pairs :]) @ changes)
+                means.append(float(found.mean()))
                 seconds = time.monotonic() - begin
                 report(
                     Progress(
                         generation=generation,
-                        mean=float(found.mean()),
+                        mean=means[-1],
                         best=float(found.max()),
                         distance=way,
                         seconds=seconds,
@@ -180,9 +196,10 @@ def train(settings: EnvSettings, how: TrainSettings, report: Report) -> Policy:
         except KeyboardInterrupt:
             if not ascent.count:
                 raise
-        return Policy(
+        policy = Policy(
             **symmetric_weights(free),
             robot=batch.robot.name,
             clock=settings.clock,
             action_scale=settings.action_scale,
         )
+        return policy, still_rising(means)

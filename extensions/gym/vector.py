@@ -16,10 +16,8 @@ from hexapod_cosim.extensions.gym.batch import Batch
 from hexapod_cosim.extensions.gym.checks import check_count, check_names, checked_mask
 from hexapod_cosim.extensions.gym.environment import (
     LARGEST_SEED,
-    RENDER_MODES,
     action_space,
     checked,
-    checked_render_mode,
     observation_space,
 )
 from hexapod_cosim.extensions.gym.settings import JOINTS, RATE, REASONS, TERMS, changed
@@ -52,7 +50,6 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         autoreset_mode: what follows the end of an episode.
         copy: whether `reset` and `step` return copies of observations, rewards and flags. Without,
             they return the arrays that the next call overwrites.
-        render_mode: "rgb_array" for `render`.
 
     A robot whose action is not finite does not step: `info["refused"]` marks it, its observation
     stays and its reward is 0. The info of a step also has `terms`, the weighted terms of the reward
@@ -69,19 +66,13 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         threads: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         copy: bool = True,
-        render_mode: str | None = None,
         **changes: Any,
     ) -> None:
         mode = checked_mode(autoreset_mode)
         check_count("number of environments", num_envs)
         self.settings = changed(task_settings(task), changes)
         self.num_envs, self._copy, self._mode = num_envs, copy, mode
-        self.render_mode = checked_render_mode(render_mode)
-        self.metadata = {
-            "autoreset_mode": mode,
-            "render_modes": list(RENDER_MODES),
-            "render_fps": RATE,
-        }
+        self.metadata = {"autoreset_mode": mode, "render_modes": [], "render_fps": RATE}
         self.single_action_space = action_space()
         self.single_observation_space = observation_space(self.settings)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -138,7 +129,11 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         environment.
         """
         batch = self._batch
-        self._check_begun("step")
+        if not self._begun.all():
+            raise gymnasium.error.ResetNeeded(
+                f"step: got a call before the reset of {np.count_nonzero(~self._begun)} "
+                "environments, expected one after it; call reset"
+            )
         batch.action[...] = checked(actions, (self.num_envs, JOINTS))
         batch.step()
         return (
@@ -148,14 +143,6 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
             self._given(batch.truncated),
             self._info(),
         )
-
-    def _check_begun(self, call: str) -> None:
-        """Raises ResetNeeded unless each environment has been reset."""
-        if not self._begun.all():
-            raise gymnasium.error.ResetNeeded(
-                f"{call}: got a call before the reset of {np.count_nonzero(~self._begun)} "
-                "environments, expected one after it; call reset"
-            )
 
     def _info(self) -> dict[str, Any]:
         batch = self._batch
@@ -188,16 +175,6 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
                 message[index] = self._batch.message(int(index))
             found |= {"message": message, "_message": failed}
         return found
-
-    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """Returns a picture (360, 480, 3) of each robot, None without a render mode.
-
-        Raises ResetNeeded before the first reset of each environment.
-        """
-        if self.render_mode is None:
-            return None
-        self._check_begun("render")
-        return tuple(self._batch.frame(index) for index in range(self.num_envs))
 
     def _given(self, array: NDArray[Any]) -> NDArray[Any]:
         return array.copy() if self._copy else array

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
-from hexapod_cosim.cosim.interface.start_values import parameter_values
+from hexapod_cosim.cosim.interface.plant import parameter_values
 from hexapod_cosim.extensions.identify.log import ATTITUDE, Log, channel_of
 from hexapod_cosim.extensions.identify.numbers import Unknown
 from hexapod_cosim.extensions.identify.plant import LogPlant

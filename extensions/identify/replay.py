@@ -149,7 +149,7 @@ def _page(done: Replay, robot: Robot, command: str, simulated_file: str) -> str:
     columns = {name: done.simulated.column(name) for name in done.names}
     return render(
         TEMPLATE,
-        extension="identify",
+        package=__package__,
         title=f"Replay of {Path(done.log.where).name}",
         headline=f"Robot {robot.name}, {time[-1] - time[0]:.2f} s, {len(time)} rows",
         lead=LEAD,
@@ -203,7 +203,7 @@ def replay_command(
     words += [word for text in settings or [] for word in ("--set", text)]
     words += ["--fmu", str(fmu)] if fmu else []
     recorded = read_log(log, torso_com=own.torso.com)
-    with results_folder(output or Path("out") / "replay") as folder:
+    with results_folder(output or Path("out") / "replay", own=("replay.csv",)) as folder:
         with waiting("replaying the log"):
             done = replay(recorded, own, fmu=fmu, parameters=parameters)
         folder.begin()

@@ -19,6 +19,7 @@ from hexapod_cosim.extensions.identify.screening import left_out
 from hexapod_cosim.extensions.identify.unknowns import BIAS
 
 KIND, ROBOT_FILE, SENSORS, RESULT = "identify", "robot.toml", "sensors.toml", "identify.json"
+FILES = (ROBOT_FILE, SENSORS, RESULT)
 ESTIMATES = ("number", "unit", "before", "found", "95 % interval", "determined")
 ERRORS = ("channel", "unit", "before", "after", "ratio", "noise", "squares over noise")
 MOTOR = {"servo.torque_constant", "servo.resistance"}

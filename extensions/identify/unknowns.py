@@ -15,7 +15,6 @@ from hexapod_cosim.extensions.identify.numbers import Unknown, section
 from hexapod_cosim.extensions.identify.numbers.bodies import com_row, gyration_row, mass_row
 from hexapod_cosim.extensions.identify.numbers.servo import MOTOR, SERVO
 from hexapod_cosim.models import Robot
-from hexapod_cosim.models.friction import BRISTLE_LAWS
 
 GROUPS = ("servo", "mass", "contact", "sensor", "zero")  # that a user can choose
 OF_FILE = ("servo", "mass", "contact")  # of the robot file, not of sensors
@@ -34,14 +33,14 @@ ROBOT = (
     section("contact.stiffness", "N/m^1.5", "contact", 1.0),
     section("contact.restitution", "1", "contact", 0.2, positive=False, low=0.0, high=1.0),
     section(
-        "friction.mu", "1", "contact", 0.3, applies=lambda robot: robot.friction.law != "none"
+        "friction.mu", "1", "contact", 0.3, applies=lambda robot: robot.friction.has_friction
     ),
     section(
-        "friction.slope", "s/m", "contact", 0.7, applies=lambda robot: robot.friction.law == "tanh"
+        "friction.slope", "s/m", "contact", 0.7, applies=lambda robot: robot.friction.creeps
     ),
     section(
         "friction.presliding", "m", "contact", 0.7,
-        applies=lambda robot: robot.friction.law in BRISTLE_LAWS,
+        applies=lambda robot: robot.friction.has_bristles,
     ),
 )  # fmt: skip
 # prior of the bias of each reading, by channel, in its unit

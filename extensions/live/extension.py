@@ -13,4 +13,8 @@ REALTIME = Command(
     about="Measure how long the plant takes for a step.",
     place=f"{PACKAGE}.commands:realtime",
 )
-EXTENSION = Extension(commands=[LIVE, REALTIME])
+EXTENSION = Extension(
+    commands=[LIVE, REALTIME],
+    release={"browser/robot.wasm": f"{PACKAGE}.static_page:robot_module"},
+    site={"walk.html": f"{PACKAGE}.static_page:write_static_page"},
+)

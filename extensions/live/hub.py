@@ -5,23 +5,17 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Awaitable, Callable
-from time import monotonic
 from typing import Any
 
-from hexapod_cosim.extensions.live.messages import Message, MessageError, read_message
-
 MOST_CLIENTS = 8
-RATE, BURST = 100.0, 500.0  # messages per second and at once, of a page
 
 
 class Client:
-    """A connected page: what it is to be sent, the newest of each kind, and its rate."""
+    """A connected page, and what it is to be sent: the newest of each kind."""
 
-    def __init__(self, now: Callable[[], float] = monotonic) -> None:
-        self._now = now
+    def __init__(self) -> None:
         self._waiting: dict[str, str] = {}
         self._ready = asyncio.Event()
-        self._left, self._last = BURST, now()
 
     def offer(self, kind: str, text: str) -> None:
         """Replaces what is to be sent of a kind."""
@@ -36,18 +30,6 @@ class Client:
             texts, self._waiting = list(self._waiting.values()), {}
             for text in texts:
                 await send(text)
-
-    def read(self, text: str | bytes) -> Message:
-        """Returns a message of the page.
-
-        Raises MessageError for what is none and for a message above the rate.
-        """
-        now = self._now()
-        self._left = min(self._left + (now - self._last) * RATE, BURST) - 1.0
-        self._last = now
-        if self._left < 0.0:
-            raise MessageError("too many messages", expected=f"at most {RATE:g} a second")
-        return read_message(text)
 
 
 class Hub:

@@ -11,7 +11,7 @@ from typing import Any
 
 from hexapod_cosim.controller import BodyCommand
 from hexapod_cosim.extensions.live import state
-from hexapod_cosim.extensions.live.messages import Action, Change, Drive, Message, Push
+from hexapod_cosim.extensions.live.messages import Action, Change, Drive, Leg, Message, Push
 from hexapod_cosim.extensions.live.pacing import Pacer
 from hexapod_cosim.extensions.live.recording import NO_FORCE, Force, Recording
 from hexapod_cosim.extensions.live.robot import MOST_WEIGHTS, LiveRobot
@@ -94,7 +94,7 @@ class Loop:
         before = self.robot.fault
         self.robot.step(self._command, force)
         if self._recording is not None:
-            self._recording.note(self._command, force)
+            self._recording.note(self._command, force, self.robot.limp)
             if self.robot.fault or self._recording.is_full:
                 self._end_recording()
         if self.robot.fault != before:
@@ -133,6 +133,8 @@ class Loop:
                 self._change(message)
             case Action():
                 self._act(message.action)
+            case Leg():
+                self._note(self.robot.toggle_leg(message.leg))
 
     def _push(self, push: Push) -> None:
         size = (push.x**2 + push.y**2 + push.z**2) ** 0.5

@@ -4,6 +4,7 @@
     {"type": "push", "x": 0, "y": 5, "z": 0}
     {"type": "set", "key": "gait", "value": "ripple"}
     {"type": "do", "action": "record"}
+    {"type": "leg", "leg": 0}
 
 A page is not trusted: types and ranges are checked here, names in `settings.py`.
 """
@@ -13,7 +14,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models import LEG_NAMES, HexapodError
 
 ACTIONS = ("place", "pause", "resume", "record", "stop")
 KEYS = ("control", "gait", "friction", "ground")  # of `set`
@@ -83,8 +84,26 @@ class Action:
             raise ValueError(self.action)
 
 
-Message = Drive | Push | Change | Action
-KINDS: dict[str, type[Message]] = {"drive": Drive, "push": Push, "set": Change, "do": Action}
+@dataclass(frozen=True)
+class Leg:
+    """A click on a leg (index in LEG_NAMES): it goes limp, or works again."""
+
+    leg: int
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for what is no leg."""
+        if isinstance(self.leg, bool) or self.leg not in range(len(LEG_NAMES)):
+            raise ValueError(self.leg)
+
+
+Message = Drive | Push | Change | Action | Leg
+KINDS: dict[str, type[Message]] = {
+    "drive": Drive,
+    "push": Push,
+    "set": Change,
+    "do": Action,
+    "leg": Leg,
+}
 
 
 def read_message(text: str | bytes) -> Message:

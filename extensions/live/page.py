@@ -43,7 +43,7 @@ def render_page(
     return render(
         TEMPLATE,
         controls=list(choices.controls),
-        extension="live",
+        package=__package__,
         title=choices.scenario.title,
         robot=choices.scenario.robot,
         setup=Markup(as_json(_describe(choices) | dict(more or {}))),

@@ -1,17 +1,8 @@
 """A robot whose plant and controller are stepped one macro-step at a time, and changed meanwhile.
 
-The steps are those of `cosim/master/loop.py`: read outputs, call the controller, set inputs, step.
-So a walk from the start repeats under `hexapod simulate` bit for bit. The built-in controls are the
-controller FMU; all others run as in `simulate`.
-
-Changes while the robot walks:
-
-- friction: the plant begins again in its present pose and motion, on ground of the new friction.
-  Bristles of the friction laws and the measures of work and slip begin at zero.
-- control, from a built-in one to another: it goes on in the present phase of the walk at once.
-- gait of a built-in control: the robot walks on slowly meanwhile (`settings.py`).
-- ground, and control or gait where a controller of the user walks: the robot is placed at its
-  start.
+The steps are those of `cosim/master/loop.py`, so a walk from the start repeats under
+`hexapod simulate` bit for bit. The built-in controls are the controller FMU; all others run as in
+`simulate`. README.md, "What changes while the robot walks", describes each change.
 
 A controller that raises an exception, ends the program or commands a value that the plant refuses
 is replaced by the last joint commands that the plant accepted.
@@ -20,7 +11,9 @@ is replaced by the last joint commands that the plant accepted.
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
+
+import numpy as np
 
 from hexapod_cosim.controller import BodyCommand, ControllerError, Gains, Gait, JointCommand
 from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
@@ -28,11 +21,12 @@ from hexapod_cosim.cosim.control.controllers import make_controller
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw, law_of_ours
 from hexapod_cosim.cosim.export.plant import export_controller
 from hexapod_cosim.cosim.interface.controller import controller_parameters
+from hexapod_cosim.cosim.interface.names import JOINTS, LEGS
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_block import StepError
 from hexapod_cosim.cosim.master.loop import JointController, macro_step
 from hexapod_cosim.cosim.master.sensors import errors_of
-from hexapod_cosim.cosim.master.signals import Signals
+from hexapod_cosim.cosim.master.signals import SERVOS, Signals
 from hexapod_cosim.cosim.results.window import robot_weight
 from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
 from hexapod_cosim.cosim.run.plant import PlantFmus, apply_settings, initialise_plant
@@ -48,20 +42,10 @@ from hexapod_cosim.extensions.live.settings import (
     gait_of,
     plan_change,
 )
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models import LEG_NAMES, HexapodError
 
 HORIZON = 1e6  # s    stop time of the FMUs
-STATE = "initial."  # prefix of the plant's parameters for the state at the start
 MOST_WEIGHTS = 3.0  # body weights    largest push
-
-
-@dataclass
-class PendingGait:
-    """A gait that the robot changes to; `since` is the macro-step of the request."""
-
-    plan: GaitChange
-    gait: Gait
-    since: int
 
 
 class LiveRobot(Closing):
@@ -119,10 +103,9 @@ class LiveRobot(Closing):
     @property
     def wanted(self) -> Settings:
         """Returns the settings that hold when all changes are made."""
-        pending = self._pending
-        return self.settings if pending is None else replace(self.settings, gait=pending.gait.name)
-
-    # ------------------------------------------------------------------------------- changes
+        if self._pending is None:
+            return self.settings
+        return replace(self.settings, gait=self._pending[1].name)
 
     def place(self, settings: Settings | None = None) -> None:
         """Places the robot at its start, standing, under settings: given or wanted ones.
@@ -143,7 +126,8 @@ class LiveRobot(Closing):
         scenario = self.plan.scenario
         self.count, self.settings = 0, settings
         self.fault, self.stopped = "", False
-        self._pending: PendingGait | None = None
+        # a change of gait: its plan, the next gait, and the macro-step of the request
+        self._pending: tuple[GaitChange, Gait, int] | None = None
         self._plant.reset()
         apply_settings(self._plant, self.plan.robot)
         endless = replace(self.plan, scenario=replace(scenario, duration=HORIZON))
@@ -151,8 +135,20 @@ class LiveRobot(Closing):
         self.weight = robot_weight(self.parameters)
         self.signals = Signals(self._plant, errors=errors_of(scenario, self.plan.schedule))
         self.signals.read()
+        self._servos = np.zeros(len(SERVOS))
         self._last = JointCommand(angle_ref=self.signals.measurement.angle.copy())
         self._start_controller()
+
+    def toggle_leg(self, leg: int) -> str:
+        """Makes all servos of a leg limp, or healthy again; returns which, in a sentence."""
+        weakness = self._servos[: LEGS * JOINTS].reshape(LEGS, JOINTS)
+        weakness[leg] = 1.0 - weakness[leg]
+        return f"Leg {LEG_NAMES[leg]} {'is limp' if weakness[leg, 0] else 'works again'}."
+
+    @property
+    def limp(self) -> tuple[int, ...]:
+        """The legs that are limp."""
+        return tuple(np.flatnonzero(self._servos[: LEGS * JOINTS : JOINTS]).tolist())
 
     def change(self, change: Change) -> None:
         """Begins a change of the settings. Raises HexapodError, and then leaves all as it was."""
@@ -163,7 +159,8 @@ class LiveRobot(Closing):
         if self.stopped or change.key == "ground":
             self.place(wanted)
         elif change.key == "friction":
-            self._change_friction(wanted, plan)
+            self._plant.set_parameters({"friction.mu": wanted.friction})
+            self.settings, self.plan = replace(self.settings, friction=wanted.friction), plan
         elif self.fault or not _can_go_on(self.plan, plan):
             self.place(wanted)
         elif change.key == "control":
@@ -176,28 +173,6 @@ class LiveRobot(Closing):
         scenario = self.choices.scenario_with(settings)
         return make_plan(scenario, gains=self._gains if _is_built_in(scenario.control) else None)
 
-    def _change_friction(self, wanted: Settings, plan: RunPlan) -> None:
-        """Starts the plant again in its present state with another friction."""
-        self.settings, self.plan = replace(self.settings, friction=wanted.friction), plan
-        state = self._state()
-        self._plant.reset()
-        apply_settings(self._plant, plan.robot)
-        self._plant.set_parameters({**plan.scenario.parameters, **state})
-        self._plant.initialise(self.time, HORIZON)
-        self.signals.read()
-
-    def _state(self) -> dict[str, float]:
-        """Returns the plant's pose and motion as the parameters of a start."""
-        present = dict(zip(self.signals.names, self.signals.values.tolist(), strict=True))
-        own = {
-            name: name.removeprefix(STATE)
-            for name in self._plant.variables
-            if name.startswith(STATE)
-        }
-        return {
-            name: present[key if key in present else f"torso.{key}"] for name, key in own.items()
-        }
-
     def _tune(self, plan: RunPlan, prefix: str) -> None:
         """Sets the parameters of the controller FMU whose names begin with a prefix."""
         assert self._built_in is not None
@@ -206,29 +181,24 @@ class LiveRobot(Closing):
             {name: value for name, value in given.items() if name.startswith(prefix)}
         )
 
-    # ------------------------------------------------------------------------- change of gait
-
     def _request_gait(self, plan: RunPlan) -> None:
         """Begins to walk slowly, for a change to the gait of a plan."""
         setup = plan.controller
         change = plan_change(setup.robot, self._gait, setup.gait)
-        self.plan, self._pending = plan, PendingGait(change, setup.gait, self.count)
+        self.plan, self._pending = plan, (change, setup.gait, self.count)
         self.limits = change.limits.least(self.limits)
 
     def _follow_change(self) -> None:
         """Does what is due of a change of gait."""
-        pending = self._pending
-        if pending is None or self.fault:
+        if self._pending is None or self.fault:
             return
-        change, passed = pending.plan, self.count - pending.since
+        change, gait, since = self._pending
+        passed = self.count - since
         if passed == round(change.begin / self.h):
             self._tune(self.plan, "gait.")
-            self._gait = pending.gait
-            self.settings = replace(self.settings, gait=pending.gait.name)
+            self._gait, self.settings = gait, replace(self.settings, gait=gait.name)
         if passed == round(change.end / self.h):
             self.limits, self._pending = find_limits(self.plan.controller.robot, self._gait), None
-
-    # ------------------------------------------------------------------------------- controllers
 
     def _start_controller(self) -> None:
         """Makes the controller of the plan; one that cannot start is a fault."""
@@ -264,8 +234,6 @@ class LiveRobot(Closing):
         self._built_in.initialise(self.time, HORIZON)
         return law_of_ours(self._built_in, period=setup.period)
 
-    # ------------------------------------------------------------------------------- steps
-
     def step(self, command: BodyCommand, force: Force) -> None:
         """Makes one macro-step under a body command and a force on the torso [N], world axes.
 
@@ -276,6 +244,7 @@ class LiveRobot(Closing):
         self._follow_change()
         self.signals.push[:3] = force
         try:
+            self.signals.set_servos(self._servos)
             self._advance(command)
             self.count += 1
         except HexapodError as error:

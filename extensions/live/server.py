@@ -28,7 +28,7 @@ from starlette.websockets import WebSocket
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.extensions.live.hub import Hub
 from hexapod_cosim.extensions.live.loop import Loop
-from hexapod_cosim.extensions.live.messages import MessageError
+from hexapod_cosim.extensions.live.messages import MessageError, read_message
 from hexapod_cosim.extensions.live.page import render_page
 from hexapod_cosim.extensions.live.robot import LiveRobot
 from hexapod_cosim.extensions.live.settings import Choices
@@ -188,7 +188,7 @@ class LiveServer:
         sending = asyncio.ensure_future(client.send_all(connection.send_text))
         try:
             while (message := await connection.receive())["type"] != "websocket.disconnect":
-                self._loop.post(client.read(message.get("text") or message.get("bytes") or ""))
+                self._loop.post(read_message(message.get("text") or message.get("bytes") or ""))
         except MessageError as error:
             await connection.close(POLICY, str(error)[:120])
         finally:

@@ -15,7 +15,7 @@ from hexapod_cosim.controller import PATTERNS, make_gait
 from hexapod_cosim.cosim.common.components import CONTROLLER
 from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.common.plant_files import in_source_tree, plant_folders
-from hexapod_cosim.cosim.export.cross_build import BROWSER, Library, build_library
+from hexapod_cosim.cosim.export.cross_build import Library, Target, build_library
 from hexapod_cosim.cosim.interface.plant import enumerations_of, load_interface
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import CONTROLS
@@ -25,6 +25,14 @@ from hexapod_cosim.extensions.live.state import describe_world
 from hexapod_cosim.models import HexapodError, Robot, load_robot
 
 _TREE = Path(__file__).resolve().parents[2]
+# a module for browsers; all of them have vectors since 2021 or 2023 (Safari)
+BROWSER = Target(
+    "wasm32-wasi",
+    ".wasm",
+    ("-Wl,--export-dynamic", "-Wl,--strip-all", "-Wl,-z,stack-size=1048576"),
+    "generic+simd128+bulk_memory+nontrapping_fptoint",
+    ("-mexec-model=reactor",),
+)
 
 
 def write_static_page(path: Path) -> Path:
@@ -72,11 +80,9 @@ def robot_module() -> bytes:
     if in_source_tree():
         return build_library(Library("robot", _sources(), flags=("-DHX_SHARED",)), BROWSER)
     path = plant_folders()[0] / "browser" / "robot.wasm"
-    if not path.is_file():
-        raise HexapodError(
-            "no WebAssembly module", got="a wheel for one machine", fix="use a clone"
-        )
-    return path.read_bytes()
+    if path.is_file():
+        return path.read_bytes()
+    raise HexapodError("no WebAssembly module", got="a wheel for one machine", fix="use a clone")
 
 
 def _sources() -> dict[str, Path]:

@@ -3,9 +3,9 @@
 The data flow, in the order of the modules:
 
     study file -> reading (rules, factors, checks) -> Study (records)
-    Study -> runs: numbers every run and makes its Order
+    Study -> orders: numbers every run and makes its Order
     Study -> job: what every worker needs -> folder: the manifest
-    orders -> dispatch -> workers (an executor) -> worker -> Summary -> store (SQLite, a row a run)
-    an optimisation asks Optuna for its orders: search
-    store -> groups, search -> summary -> tables, figures, page; store -> folder: results.parquet
+    orders -> dispatch (an executor) -> worker -> Summary -> store (SQLite, a row a run)
+    an optimisation asks for its orders trial by trial: search
+    store -> summary -> figures, page; store -> folder: results.parquet
 """

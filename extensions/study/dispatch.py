@@ -1,50 +1,142 @@
-"""Dispatches the runs of a study in chunks to an executor and stores the results.
+"""Runs the orders of a study in chunks on an executor of `concurrent.futures`.
 
-Orders are made when a worker has room for them, and rows are written to the disk in parts, so
-memory does not grow with the number of runs, except for a byte for each that marks it as done. The
-result of a run depends on its order alone, and so neither on the workers nor on the chunks nor on
-how often the study was killed.
+The executor is this process, processes of this machine, or a Dask cluster. Orders are made when a
+worker has room for them, and rows are written to the disk in parts, so memory does not grow with
+the number of runs, except for a byte for each that marks it as done. The result of a run depends on
+its order alone, and so neither on the workers nor on the chunks nor on how often the study was
+killed.
 """
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
+from typing import Any
 
-from hexapod_cosim.extensions.study.records import Order, RunResult, Study, StudyError
+from hexapod_cosim.cosim.cli.terminal import warn
+from hexapod_cosim.cosim.common.installation import install_extra
+from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+from hexapod_cosim.cosim.master.interrupts import remembered_interrupts
+from hexapod_cosim.cosim.run.worker_pool import SerialExecutor, WorkerDiedError, WorkerPool
+from hexapod_cosim.extensions.study.job import Job
+from hexapod_cosim.extensions.study.records import Order, RunResult, StudyError
+from hexapod_cosim.extensions.study.rules import require
 from hexapod_cosim.extensions.study.store import Store
-from hexapod_cosim.extensions.study.worker import run_orders, summary_without_figures
-from hexapod_cosim.extensions.study.workers import FIX_RESUME, Workers
+from hexapod_cosim.extensions.study.worker import (
+    close_runners,
+    run_orders,
+    summary_without_figures,
+)
 
 MAX_CHUNK = 16  # runs: half a second of work, so that a dead worker loses little
 CHUNKS_PER_WORKER = 2  # a worker that finishes a chunk has the next one already
 CHECK_INTERVAL = 0.5  # s    between checks for interrupts and for workers
+CONNECT_TIMEOUT = "10s"
 MAX_DEATHS_IN_A_ROW = 10  # chunks: more are not caused by single runs
-FIX_DEATHS = (
-    "look for what ends them (memory?); a script that runs a study needs "
-    '`if __name__ == "__main__":`'
+FIX_DEATHS = "look for what ends them (memory?); a script needs `if __name__ == '__main__':`"
+FIX_RESUME = (
+    "see that the scheduler runs and all machines have the same versions, and start the study "
+    "again: it goes on, and all stored runs are kept"
 )
 DIED = "died"  # status of a run of which every worker died that had it
 WHY_DIED = "each worker that ran it ended by itself (killed, or out of memory)"
 
-ProgressSink = Callable[[int, int], None]  # numbers of new runs, and of those that did not walk
-_Chunk = Sequence[Order]
+ProgressSink = Callable[[int, int], None]  # numbers of done runs, and of those that did not walk
 
 
 @dataclass(frozen=True)
+class Workers:
+    """An executor that runs the orders of a job."""
+
+    executor: Executor
+    size: Callable[[], int]  # number of workers now, at least 1
+    deaths: tuple[type[Exception], ...] = ()  # exceptions of a task whose workers died
+    check: Callable[[], None] = lambda: None  # raises KeyboardInterrupt after Ctrl-C
+
+
+@contextmanager
+def local_workers(count: int) -> Iterator[Workers]:
+    """Runs chunks in worker processes, which have ended when the block ends, or in this process.
+
+    Args:
+        count: number of processes. Without any, which suits debuggers, a run that ends its process
+            ends the study.
+    """
+    if count == 0:
+        try:
+            yield Workers(SerialExecutor(), lambda: 1)
+        finally:
+            close_runners()
+        return
+    with TemporaryFolder("workers") as folder, WorkerPool(count, scratch=folder) as pool:
+        yield Workers(pool, lambda: count, (WorkerDiedError,))
+
+
+@contextmanager
+def cluster_workers(address: str) -> Iterator[Workers]:
+    """Runs chunks on the workers of a Dask scheduler, given its address.
+
+    Dask places the chunks, and moves them from workers that die to others. Raises StudyError when
+    no scheduler answers.
+    """
+    client = _connect(address)
+    from distributed import KilledWorker  # noqa: PLC0415  an extra
+
+    def size() -> int:
+        try:
+            if client.status != "running":
+                raise OSError(f"the client is {client.status}")
+            return max(len(client.nthreads()), 1)
+        except (OSError, RuntimeError, TimeoutError) as error:
+            got = f"{type(error).__name__}: {error}"
+            raise StudyError("the cluster is gone", got=got, fix=FIX_RESUME) from error
+
+    # its tracebacks of a dead scheduler say no more than our error does
+    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)
+    try:
+        with remembered_interrupts() as interrupts:
+            if not client.nthreads():
+                warn(f"the cluster has no workers: waiting for some (dask worker {address})")
+            yield Workers(client.get_executor(pure=False), size, (KilledWorker,), interrupts)
+    finally:
+        client.close(timeout=5)
+
+
+def _connect(address: str) -> Any:
+    try:
+        from distributed import Client  # noqa: PLC0415  an extra
+    except ImportError as error:
+        what, fix = "Dask is not installed", install_extra("cluster")
+        raise StudyError(what, fix=fix, where="--scheduler") from error
+    try:
+        if "://" not in address:
+            raise ValueError
+        return Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        what, expected = "no scheduler answers", "tcp://HOST:8786 of `dask scheduler`"
+        raise StudyError(what, got=address, expected=expected, where="--scheduler") from error
+
+
+@dataclass
 class ResultSink:
     """Receives the results of a study: its store and the display of progress."""
 
-    study: Study
+    job: Job
     store: Store
-    progress: ProgressSink
+    show: ProgressSink
+    done: int  # runs that are stored
+    failed: int = 0  # new runs that did not walk
 
-    def add(self, results: list[RunResult]) -> None:
+    def add(self, results: Sequence[RunResult]) -> None:
         """Stores results."""
         self.store.add(results)
-        self.progress(len(results), sum(not result.summary.walked for result in results))
+        self.done += len(results)
+        self.failed += sum(not result.summary.walked for result in results)
+        self.show(self.done, self.failed)
 
 
 def dispatch(
@@ -62,11 +154,13 @@ def dispatch(
     """
     dispatcher = _Dispatcher(sink, workers)
     try:
-        dispatcher.run(iter(orders), count)
-        for order in dispatcher.suspects:
-            dispatcher.run_alone(order)
+        for order in dispatcher.run(iter(orders), count):
+            if dispatcher.run(iter([order]), 1):
+                died = summary_without_figures(order, WHY_DIED, status=DIED)
+                sink.add([RunResult(order, died, 0.0)])
     finally:
-        dispatcher.cancel()
+        for future in dispatcher.pending:
+            future.cancel()
         sink.store.flush()
 
 
@@ -75,71 +169,44 @@ class _Dispatcher:
 
     def __init__(self, sink: ResultSink, workers: Workers) -> None:
         self._sink, self._workers = sink, workers
-        self._pending: dict[Future[list[RunResult]], _Chunk] = {}
+        self.pending: dict[Future[list[RunResult]], Sequence[Order]] = {}
         self._deaths_in_a_row = 0
-        self.suspects: list[Order] = []  # of chunks in which a worker died
 
-    def run(self, orders: Iterator[Order], rest: int) -> None:
-        """Runs a number `rest` of orders in chunks, the last of which are smaller."""
-        while rest or self._pending:
-            slots = CHUNKS_PER_WORKER * self._workers.size()
-            while rest and len(self._pending) < slots:
-                size = min(max(rest // (2 * slots), 1), MAX_CHUNK)
-                self._submit(tuple(islice(orders, size)))
-                rest -= size
-            for chunk, results in self._finished():
-                self.suspects += chunk if results is None else ()
-                self._sink.add(results or [])
+    def run(self, orders: Iterator[Order], rest: int) -> list[Order]:
+        """Runs a number `rest` of orders in chunks, the last of which are smaller.
 
-    def run_alone(self, order: Order) -> None:
-        """Runs an order while no other one is; a worker that dies is its failure."""
-        self._submit((order,))
-        while self._pending:
-            self._workers.size()  # raises an error when there are none
-            for _, results in self._finished():
-                died = summary_without_figures(order, WHY_DIED, status=DIED)
-                self._sink.add([RunResult(order, died, 0.0)] if results is None else results)
-
-    def _submit(self, chunk: _Chunk) -> None:
-        future = self._workers.executor.submit(run_orders, self._workers.job, chunk)
-        self._pending[future] = chunk
-
-    def _finished(self) -> Iterator[tuple[_Chunk, list[RunResult] | None]]:
-        """Waits until a chunk is finished, or for a while.
-
-        Yields the finished chunks with their results, None where a worker died.
+        Returns the orders of the chunks in which a worker died.
         """
-        done, _ = wait(self._pending, timeout=CHECK_INTERVAL, return_when=FIRST_COMPLETED)
-        self._workers.check()
-        for future in done:
-            yield self._pending.pop(future), self._results(future)
+        suspects: list[Order] = []
+        while rest or self.pending:
+            slots = CHUNKS_PER_WORKER * self._workers.size()
+            while rest and len(self.pending) < slots:
+                size = min(max(rest // (2 * slots), 1), MAX_CHUNK)
+                chunk = list(islice(orders, size))
+                future = self._workers.executor.submit(run_orders, self._sink.job, chunk)
+                self.pending[future] = chunk
+                rest -= size
+            done, _ = wait(self.pending, timeout=CHECK_INTERVAL, return_when=FIRST_COMPLETED)
+            self._workers.check()
+            for future in done:
+                chunk = list(self.pending.pop(future))
+                suspects += [] if self._store(future) else chunk
+        return suspects
 
-    def _results(self, future: Future[list[RunResult]]) -> list[RunResult] | None:
-        """Returns the results of a chunk; None for one in which a worker died."""
+    def _store(self, future: Future[list[RunResult]]) -> bool:
+        """Stores the results of a chunk; returns False if its worker died."""
         try:
             results = future.result()
         except self._workers.deaths as error:
             self._deaths_in_a_row += 1
-            if self._deaths_in_a_row > MAX_DEATHS_IN_A_ROW:
-                what = "every worker dies before it has finished a run"
-                where = self._sink.study.where
-                raise StudyError(what, got=str(error), fix=FIX_DEATHS, where=where) from error
-            return None
+            few, what = self._deaths_in_a_row <= MAX_DEATHS_IN_A_ROW, "each worker dies"
+            require(few, str(error), "a worker that goes on", "", what=what, fix=FIX_DEATHS)
+            return False
         except StudyError:
             raise
-        except CancelledError as error:
-            got = "the connection to its scheduler ended"
-            raise StudyError("the cluster is gone", got=got, fix=FIX_RESUME) from error
-        except Exception as error:  # from a worker without the package, or with another one
-            raise StudyError(
-                "a worker cannot run the study",
-                got=f"{type(error).__name__}: {error}",
-                fix="install the same versions on all machines of the cluster",
-            ) from error
+        except Exception as error:  # the scheduler ended, or a worker has not this package
+            got, what = f"{type(error).__name__}: {error}", "the workers cannot run the study"
+            raise StudyError(what, got=got, fix=FIX_RESUME) from error
         self._deaths_in_a_row = 0
-        return results
-
-    def cancel(self) -> None:
-        """Cancels the chunks that are not finished."""
-        for future in self._pending:
-            future.cancel()
+        self._sink.add(results)
+        return True

@@ -5,10 +5,9 @@ results.parquet has all runs in the order of their numbers and is the same howev
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,22 +16,23 @@ import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
 from hexapod_cosim.cosim.common.files import (
+    RESUMABLE,
     RUN_FILE,
     RUNNING,
-    STUDY,
     atomic_path,
-    not_writable,
+    claim_folder,
+    clear_folder,
     read_json,
     to_json,
     write_json,
 )
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.extensions.study.records import StudyError
-from hexapod_cosim.extensions.study.store import BOOLEAN, INTEGER, REAL, TEXT, WALL, Store
+from hexapod_cosim.extensions.study.rules import leaves
+from hexapod_cosim.extensions.study.store import BOOLEAN, INTEGER, REAL, TEXT, WALL, Store, quoted
 
-MANIFEST, LOCK, RESULTS = "manifest.json", ".lock", "results.parquet"
-COMPRESSION = "zstd"
-METADATA_PREFIX = "hexapod."  # of the keys of a file's metadata
+KIND = "study"  # in run.json
+MANIFEST, LOCK, RESULTS, OPTIMUM = "manifest.json", ".lock", "results.parquet", "optimum.json"
 MAX_NAMED = 6  # differences in a message
 PARQUET_TYPES = {
     INTEGER: pa.int64(),
@@ -45,7 +45,8 @@ PARQUET_TYPES = {
 def begin_folder(folder: Path, manifest: Mapping[str, Any], *, command: str) -> None:
     """Writes the manifest into a new folder, or checks that the folder has the same one.
 
-    Raises StudyError when the folder holds anything else, HexapodError when it cannot be written.
+    Raises HexapodError when the folder holds anything else or cannot be written. The files of
+    an earlier run are deleted.
 
     Args:
         command: the command line that repeats the study.
@@ -53,21 +54,12 @@ def begin_folder(folder: Path, manifest: Mapping[str, Any], *, command: str) -> 
     if (folder / MANIFEST).exists():
         _compare(read_json(folder / MANIFEST), json.loads(to_json(manifest)), folder)
         return
-    try:
-        entries = sorted(entry.name for entry in folder.iterdir() if entry.name[0] != ".")
-    except OSError as error:
-        raise not_writable(folder, error) from error
-    if entries and entries != [RUN_FILE]:
-        raise StudyError(
-            "the folder holds other files",
-            got=entries[0],
-            expected=f"a new or empty folder, or this study's (it has {MANIFEST})",
-            fix="choose another with -o",
-            where=str(folder),
-        )
-    facts = {"kind": STUDY, "status": RUNNING, "title": manifest["title"], "command": command}
-    write_json(folder / RUN_FILE, facts)
+    claim_folder(folder)
+    clear_folder(folder)
     write_json(folder / MANIFEST, manifest)
+    facts = {"kind": KIND, "status": RUNNING, "title": manifest["title"], "command": command}
+    facts |= {RESUMABLE: True}
+    write_json(folder / RUN_FILE, facts)
 
 
 def finish_folder(folder: Path) -> None:
@@ -77,55 +69,35 @@ def finish_folder(folder: Path) -> None:
 
 def _compare(stored: Mapping[str, Any], now: Mapping[str, Any], folder: Path) -> None:
     """Raises StudyError when two manifests differ."""
-    found = list(differences(stored, now))
+    old, new = dict(leaves(stored)), dict(leaves(now))
+    found = [
+        f"{name} was {old.get(name)!s:.40}, is {new.get(name)!s:.40}"
+        for name in {**old, **new}
+        if old.get(name) != new.get(name)
+    ]
     if found:
-        more = f" and {len(found) - MAX_NAMED} more" if len(found) > MAX_NAMED else ""
         raise StudyError(
             "the folder holds another study's runs",
-            got="; ".join(found[:MAX_NAMED]) + more,
+            got="; ".join(found[:MAX_NAMED]),
             expected="what they were begun with",
             fix="choose another folder with -o, or put back what changed",
             where=str(folder),
         )
 
 
-def differences(stored: Any, now: Any, name: str = "") -> Iterator[str]:
-    """Yields a sentence for each entry in which two manifests differ."""
-    if isinstance(stored, Mapping) and isinstance(now, Mapping):
-        for key in dict.fromkeys([*stored, *now]):
-            yield from differences(stored.get(key), now.get(key), f"{name}.{key}" if name else key)
-    elif stored != now:
-        yield f"{name} was {_short(stored)}, is {_short(now)}"
-
-
-def _short(value: Any) -> str:
-    text = "not there" if value is None else json.dumps(value)
-    return text if len(text) <= 40 else f"{text[:37]}..."
-
-
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Makes the folder and locks it: within the block no other process runs a study into it.
+    """Locks a folder: within the block no other process runs a study into it. Raises StudyError.
 
-    Raises StudyError when another process has the lock, HexapodError when the folder cannot be
-    written. On a file system without locks the folder is not locked.
+    On a file system without locks the folder is not locked.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / LOCK).touch()
-    except OSError as error:
-        raise not_writable(folder, error) from error
     lock = FileLock(folder / LOCK, blocking=False, fallback_to_soft=False)
-    try:
-        lock.acquire()
-    except Timeout as error:
-        raise StudyError(
-            "another process runs a study into this folder",
-            fix="wait for it, or choose another with -o",
-            where=str(folder),
-        ) from error
-    except OSError:
-        pass  # a file system without locks
+    with suppress(NotImplementedError):  # a file system without locks
+        try:
+            lock.acquire()
+        except Timeout as error:
+            what, fix = "another process runs a study into this folder", "wait for it, or use -o"
+            raise StudyError(what, fix=fix, where=str(folder)) from error
     try:
         yield
     finally:
@@ -133,41 +105,29 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def export_runs(store: Store, folder: Path) -> None:
-    """Writes results.parquet. The file is never partial; units are in the metadata of columns."""
-    columns = [item for item in store.columns if item.name != WALL]
-    fields = [
-        pa.field(
-            item.name,
-            PARQUET_TYPES[item.kind.split()[0]],
-            metadata={"unit": item.unit} if item.unit else None,
-        )
-        for item in columns
-    ]
-    schema = pa.schema(fields, metadata=provenance(read_json(folder / MANIFEST)))
-    with (
-        atomic_path(folder / RESULTS) as part,
-        pq.ParquetWriter(part, schema, compression=COMPRESSION) as writer,
-    ):
-        for rows in store.tables(columns):
-            values = zip(zip(*rows, strict=True), schema.types, strict=True)
-            arrays = [pa.array(column, kind) for column, kind in values]
-            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+    """Writes results.parquet. The file is never partial; units are in the metadata of columns.
 
-
-def provenance(manifest: Mapping[str, Any]) -> dict[str, str]:
-    """Returns the metadata of a file of results, by which it can be trusted without its folder.
-
-    They depend on the study only, not on where, when and how often it was run: the entries of the
-    manifest as JSON under hexapod.NAME, and the SHA-256 of the gains.
+    The file's metadata have the entries of the manifest as JSON under hexapod.NAME, by which it
+    can be trusted without its folder.
     """
-    found = {
-        f"{METADATA_PREFIX}{name}": value if isinstance(value, str) else _compact_json(value)
-        for name, value in manifest.items()
-    }
-    gains = found[f"{METADATA_PREFIX}gains"].encode()
-    return found | {f"{METADATA_PREFIX}gains_sha256": hashlib.sha256(gains).hexdigest()}
+    columns = [item for item in store.columns if item.name != WALL]
+    names = ", ".join(quoted(item.name) for item in columns)
+    rows = store.select(f"SELECT {names} FROM runs ORDER BY run")
+    kinds = [PARQUET_TYPES[item.kind.split()[0]] for item in columns]
+    fields = [
+        pa.field(item.name, kind, metadata={"unit": item.unit} if item.unit else None)
+        for item, kind in zip(columns, kinds, strict=True)
+    ]
+    manifest = read_json(folder / MANIFEST)
+    metadata = {f"hexapod.{name}": _compact_json(value) for name, value in manifest.items()}
+    arrays = [pa.array([row[k] for row in rows], kind) for k, kind in enumerate(kinds)]
+    table = pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=metadata))
+    with atomic_path(folder / RESULTS) as part:
+        pq.write_table(table, part, compression="zstd")
 
 
 def _compact_json(content: Any) -> str:
-    """Returns JSON in one line, with the keys in their order."""
+    """Returns JSON in one line, or a text as it is."""
+    if isinstance(content, str):
+        return content
     return json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))

@@ -1,22 +1,143 @@
-"""Writes report.html, the report of a study in one file, also of a study that is not finished."""
+"""Writes the tables of a study as texts, and its report: one file, also of a study that runs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-import tomlkit
-
-from hexapod_cosim.cosim.common.files import without_none, write_text
+from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.report.page import embedded, render
+from hexapod_cosim.cosim.report.tables import number, shown_change
 from hexapod_cosim.cosim.results.comparison import METHOD
-from hexapod_cosim.cosim.results.metric_table import METRICS
-from hexapod_cosim.extensions.study import tables
-from hexapod_cosim.extensions.study.figures import drawings, save
-from hexapod_cosim.extensions.study.records import SOBOL, Study
-from hexapod_cosim.extensions.study.summary import SUMMARY, Results
+from hexapod_cosim.cosim.results.metric_table import DUST, FLOORS, METRICS, shown_metrics
+from hexapod_cosim.cosim.results.summary import balance_warnings
+from hexapod_cosim.extensions.study.figures import drawing_of, save
+from hexapod_cosim.extensions.study.records import WALKED, shown_value
+from hexapod_cosim.extensions.study.store import FIGURES
+from hexapod_cosim.extensions.study.summary import POINT_METRICS, SUMMARY, Mean, Point, Results
+
+SHOWN_POINTS = 100  # rows of the table of points
+PARTS = {"training": "training", "held_out": "held out"}
+ENDINGS = {COMPLETED: "fell"}  # how a run ended that did not walk to its end
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of texts."""
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    left: Sequence[str] = ()  # columns that are aligned to the left: those without numbers
+
+    @property
+    def right(self) -> list[int]:
+        """The places of the columns with numbers."""
+        return [k for k, name in enumerate(self.columns) if name not in self.left]
+
+
+def overall_table(results: Results) -> Table:
+    """Returns a row for each metric: means over all walks, and the changes over all pairs."""
+    overall, controls = results.overall, results.study.controls
+    means = {
+        control: {name: mean.value for name, mean in of_control.items()}
+        for control, of_control in overall.means.items()
+    }
+    columns = ["metric", "unit", *controls]
+    for control in controls[1:]:
+        title = "change" if len(controls) == 2 else f"to {control}"
+        columns += [title, "95 % interval", ""]
+    rows = []
+    for name in (each for each in shown_metrics(means, net_slip=False) if each in FIGURES):
+        row = [name, METRICS[name][0]]
+        row += [shown_mean(name, overall.means[control][name]) for control in controls]
+        for control in controls[1:]:
+            row += shown_change(overall.changes[control][name]).values()
+        rows.append(row)
+    return Table(columns, rows, left=("metric", "unit", ""))
+
+
+def failure_table(results: Results) -> Table:
+    """Returns a row for each reason for which runs did not walk to their end."""
+    rows = [
+        [str(count), control, ENDINGS.get(status, status), reason]
+        for (control, status, reason), count in results.failures.items()
+    ]
+    return Table(["runs", "control", "how", "reason"], rows, left=("control", "how", "reason"))
+
+
+def point_table(results: Results) -> Table:
+    """Returns a row for each of at most about SHOWN_POINTS evenly chosen points."""
+    study, points = results.study, results.points
+    columns = ["point", *(factor.label for factor in study.factors)]
+    columns += [f"walked, {control}" for control in study.controls]
+    for name in POINT_METRICS:
+        columns += [f"{name} [{METRICS[name][0]}], {control}" for control in study.controls]
+        columns += [f"change to {control}" for control in study.controls[1:]]
+    step = max(math.ceil(len(points) / SHOWN_POINTS), 1)
+    return Table(columns, [_point_row(point, results) for point in points[::step]])
+
+
+def _point_row(point: Point, results: Results) -> list[str]:
+    controls, figures = results.study.controls, point.figures
+    row = [f"{point.number}{' held out' if point.held_out else ''}"]
+    row += [shown_value(value) for value in point.values.values()]
+    row += [f"{figures.walked[name]} of {figures.runs[name]}" for name in controls]
+    for name in POINT_METRICS:
+        row += [shown_mean(name, figures.means[control][name]) for control in controls]
+        row += [shown_change(found[name])["change"] for found in figures.changes.values()]
+    return row
+
+
+def optimum_table(results: Results) -> Table:
+    """Returns a row for each metric before and after an optimisation, with its change."""
+    optimum = results.optimum or {"before": {}, "best": {}}
+    before, best = optimum["before"], optimum["best"]
+    rows = [
+        [
+            *(words, name, _shown_figure(name, value), _shown_figure(name, best[part][name])),
+            *_shown_table(best["change"][part].get(name)),
+        ]
+        for part, words in PARTS.items()
+        for name, value in before.get(part, {}).items()
+    ]
+    columns = ["runs", "metric", "before", "after", "change", "95 % interval", "", "pairs"]
+    return Table(columns, rows, left=("runs", "metric", ""))
+
+
+def best_settings(results: Results) -> str:
+    """Returns the settings of the best trial as text, "" without one."""
+    if results.optimum is None:
+        return ""
+    best = results.optimum["best"]
+    values = [f"{name} {shown_value(value)}" for name, value in best["values"].items()]
+    broken = "" if best["feasible"] else "; it breaks a constraint"
+    return f"Best: trial {best['number']}, {', '.join(values)}{broken}"
+
+
+def _shown_table(table: Mapping[str, Any] | None) -> list[str]:
+    """Returns change, interval, verdict and pairs of a table of Change.as_table() from JSON."""
+    if table is None or table["relative"] is None:
+        return ["-", "", "", ""]
+    relative, low, high = (table[key] for key in ("relative", "low", "high"))
+    interval = "" if low is None else f"{100.0 * low:+.1f} to {100.0 * high:+.1f} %"
+    return [f"{100.0 * relative:+.1f} %", interval, table["verdict"], str(table["pairs"])]
+
+
+def shown_mean(name: str, item: Mean) -> str:
+    """Returns a mean with the half width of its interval as text."""
+    dust = DUST * FLOORS[name]
+    known = math.isfinite(item.half_width) and item.half_width >= dust
+    width = f" ± {item.half_width:.2g}" if known else ""
+    return number(item.value, dust=dust) + width
+
+
+def _shown_figure(name: str, value: float | None) -> str:
+    return f"{value:.0%}" if name == WALKED and value is not None else number(value)
+
 
 REPORT, FIGURES_FOLDER = "report.html", "plots"
 HEADLINES = ("slip_per_metre", "cost_of_transport")  # metrics whose changes come first
@@ -27,31 +148,23 @@ TOO_SHORT = (
 
 def write_study_report(results: Results, folder: Path) -> list[Path]:
     """Draws the figures and writes the page. Returns the files, the page last."""
-    before = math.nan
-    if results.optimum is not None and results.study.optimise is not None:
-        metric = results.study.optimise.metrics[0]
-        before = tables.number(results.optimum["before"]["training"][metric])
-    found = drawings(results, before=before)
-    files = save(found, folder / FIGURES_FOLDER) if found else []
-    pictures = [
-        (item.title, item.caption, embedded(folder / FIGURES_FOLDER / f"{name}.svg"))
-        for name, item in found.items()
-    ]
+    drawing = drawing_of(results)
+    files = save(drawing, folder / FIGURES_FOLDER) if drawing else []
     page = render(
         "study.html.jinja",
-        extension="study",
+        package=__package__,
         controls=results.study.controls,
         results=results,
         cards=cards(results),
-        overall=tables.overall_table(results),
+        overall=overall_table(results),
         meanings={name: meaning for name, (_, _, meaning) in METRICS.items()},
-        points=tables.point_table(results),
-        figures=pictures,
-        optimum=tables.optimum_table(results),
-        optimum_changes=tables.optimum_changes(results),
-        failures=tables.failure_table(results),
-        toml=_toml(results),
-        notes=notes(results),
+        points=point_table(results),
+        drawing=drawing,
+        picture=embedded(folder / FIGURES_FOLDER / f"{drawing.name}.svg") if drawing else "",
+        optimum=optimum_table(results),
+        best=best_settings(results),
+        failures=failure_table(results),
+        notes=list(notes(results)),
         method=METHOD,
     )
     write_text(folder / REPORT, page)
@@ -67,65 +180,32 @@ def cards(results: Results) -> list[tuple[str, str, str, str]]:
     ]
     for name in HEADLINES:
         for control, changes in overall.changes.items():
-            change = changes[name]
-            if text := tables.shown_change(change):
-                title = f"{name.replace('_', ' ')}, {control}"
-                of = f"95 %: {tables.shown_interval(change)}, {change.pairs} pairs"
-                found.append((title, text, of, change.verdict))
+            change, interval, verdict = shown_change(changes[name]).values()
+            if change:
+                of = f"95 %: {interval}, {changes[name].pairs} pairs"
+                found.append((f"{name.replace('_', ' ')}, {control}", change, of, verdict))
     return found
 
 
-def _toml(results: Results) -> dict[str, str]:
-    """Returns the files that repeat the study, by title."""
-    content = {"The study": results.manifest["study"]}
-    content |= {f"Scenario {name}": table for name, table in results.manifest["scenarios"].items()}
-    if results.manifest["gains"] is not None:
-        content["Gains"] = results.manifest["gains"]
-    return {title: tomlkit.dumps(without_none(table)) for title, table in content.items()}
-
-
-def notes(results: Results) -> list[str]:
-    """Returns the notes as sentences."""
-    found = [*_of_design(results.study), *_of_missing_runs(results)]
-    found += [*_without_walks(results), *_of_walks(results)]
-    for control, unbalanced in results.unbalanced.items():
-        found += unbalanced.warnings(control, runs=results.overall.runs[control])
-    return found
-
-
-def _of_design(study: Study) -> Iterator[str]:
-    if study.design == SOBOL and study.optimise is None and study.points & (study.points - 1):
-        below = 1 << (study.points.bit_length() - 1)
-        yield (
-            f"{study.points} Sobol points are no power of two: only {below} or {2 * below} would "
-            "cover the factors evenly."
-        )
-
-
-def _of_missing_runs(results: Results) -> Iterator[str]:
+def notes(results: Results) -> Iterator[str]:
+    """Yields the notes as sentences: missing runs, no walks, short walks, unbalanced energy."""
+    overall = results.overall
     if results.facts["status"] != COMPLETED and results.study.optimise is None:
         yield (
             "Not all runs are there. Means by control are of the runs that are there, which need "
             "not be of the same points and seeds; changes are of whole pairs."
         )
-
-
-def _without_walks(results: Results) -> Iterator[str]:
-    """Yields a note for each control under which no run walked to its end."""
-    overall = results.overall
     for control, total in overall.runs.items():
-        reasons = [(key, count) for key, count in results.failures.items() if key[0] == control]
-        if reasons and not overall.walked[control]:
-            (_, status, reason), count = reasons[0]
-            alike = "all" if len(reasons) == 1 else f"{count} of them"
+        walked = overall.walked[control]
+        if total and not walked:
+            (_, status, reason), count = next(
+                item for item in results.failures.items() if item[0][0] == control
+            )
+            alike = "all" if count == total else f"{count} of them"
             yield (
                 f"none of {total} {control} runs walked to its end; "
-                f"{alike} {tables.ending(status)}: {reason}"
+                f"{alike} {ENDINGS.get(status, status)}: {reason}"
             )
-
-
-def _of_walks(results: Results) -> Iterator[str]:
-    """Yields a note for each scenario and control whose walks gave no figures."""
-    for (case, control), (walked, figured) in results.walks.items():
-        if not figured:
-            yield f"All {walked} {control} walks of {case} are {TOO_SHORT}"
+        elif walked and not results.figured[control]:
+            yield f"All {walked} {control} walks are {TOO_SHORT}"
+        yield from balance_warnings(control, results.residuals[control], runs=total)

@@ -24,7 +24,7 @@ from hexapod_cosim.extensions.study.checks import (
     placed,
 )
 from hexapod_cosim.extensions.study.extension import list_studies
-from hexapod_cosim.extensions.study.factors import plain_name, read_factors, read_optimise
+from hexapod_cosim.extensions.study.factors import read_factors, read_optimise
 from hexapod_cosim.extensions.study.records import (
     DESIGNS,
     DRAWN,
@@ -38,7 +38,15 @@ from hexapod_cosim.extensions.study.rules import Rules, read_table, require
 from hexapod_cosim.models import HexapodError, unknown_name
 from hexapod_cosim.models.errors import refuse_path
 from hexapod_cosim.models.files import read_text
-from hexapod_cosim.models.schema import parse_toml, reading_toml
+from hexapod_cosim.models.schema import (
+    Choice,
+    Flag,
+    Text,
+    Whole,
+    expect_table,
+    parse_toml,
+    reading_toml,
+)
 
 OF_A_SWEEP = ("factors", "design", "points", "seeds", "controls")  # not of an optimisation
 
@@ -57,21 +65,8 @@ def load_study(path_or_name: str | Path, *, controls: Sequence[str] = ()) -> Stu
         path = bundled[str(path_or_name)]
     with reading_toml(path, kind="study", name="the study", names=list_studies, error=StudyError):
         table = parse_toml(read_text(path))
-    if controls:
-        table = _with_controls(table, controls)
     where = path.name if path in bundled.values() else str(path)
-    return study_from_table(table, where=where, folder=path.parent)
-
-
-def _with_controls(table: dict[str, Any], texts: Sequence[str]) -> dict[str, Any]:
-    """Returns a study's tables with other controls. Raises StudyError."""
-    full = [control.text for control in parse_controls(texts, where="--control")]
-    if not isinstance(table.get("optimise"), dict):
-        return {**table, "controls": full}
-    fix = "run the optimisation for each control, into folders of their own"
-    what = "an optimisation has one control"
-    require(len(full) == 1, len(full), "one --control", "--control", what=what, fix=fix)
-    return {**table, "optimise": {**table["optimise"], "control": full[0]}}
+    return study_from_table(table, where=where, folder=path.parent, controls=controls)
 
 
 def study_from_table(
@@ -79,6 +74,7 @@ def study_from_table(
     *,
     where: str,
     folder: Path = Path(),
+    controls: Sequence[str] = (),
     scenarios: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Study:
     """Makes a checked study from the tables of its file. Raises StudyError.
@@ -86,26 +82,30 @@ def study_from_table(
     Args:
         where: name of the file, for messages.
         folder: folder of the file, which paths of scenario files are relative to.
+        controls: texts that replace the controls of the file.
         scenarios: the scenarios by name, when no file shall be read and nothing be checked again.
     """
-    rules.check_plain(table, where)
     what, fix = "not a key of an optimisation", "leave it out: [optimise] says what is run"
     for key in OF_A_SWEEP if "optimise" in table else ():
         require(key not in table, key, "[optimise] alone", where, what=what, fix=fix)
     read = read_table(table, STUDY, where)
     optimise, factors = read["optimise"] or (None, read["factors"])
-    controls = _controls(read, folder, where)
+    laws = _controls(read, folder, controls, where)
     if optimise is not None:
-        optimise = replace(optimise, control=controls[0].label)
+        what, fix = "an optimisation has one control", "run it for each, into folders of their own"
+        require(len(laws) == 1, len(laws), "one --control", where, what=what, fix=fix)
+        optimise = replace(optimise, control=laws[0].label)
+        table = {**table, "optimise": {**table["optimise"], "control": laws[0].text}}
+    else:
+        table = {**table, "controls": [law.text for law in laws]}
     study = Study(
         title=read["title"] or Path(where).stem,
         cases={},
         factors=factors,
-        design=read["design"][0],
+        design=read["design"],
         points=read["points"] or 1,
         seeds=read["seeds"],
-        controls=tuple(control.label for control in controls),
-        texts={control.label: control.text for control in controls},
+        laws=laws,
         seed=read["seed"],
         optimise=optimise,
         source=dict(table),
@@ -120,39 +120,43 @@ def study_from_table(
     return study
 
 
-def _controls(read: Mapping[str, Any], folder: Path, where: str) -> tuple[Control, ...]:
-    """Returns the controls of a study's file. Raises ScenarioError."""
-    texts, place = read["controls"], f"{where}: controls"
-    if read["optimise"]:
-        texts, place = [read["optimise"][0].control], f"{where}: optimise.control"
+def _controls(
+    read: Mapping[str, Any], folder: Path, given: Sequence[str], where: str
+) -> tuple[Control, ...]:
+    """Returns the given controls, or else those of a study's file. Raises ScenarioError."""
+    if given:
+        return parse_controls(given, where="--control")
+    texts = [read["optimise"][0].control] if read["optimise"] else read["controls"]
+    place = f"{where}: {'optimise.control' if read['optimise'] else 'controls'}"
     return parse_controls([control_beside(text, folder) for text in texts], where=place)
 
 
 def _check_points(points: int | None, study: Study) -> None:
     """Checks that drawn designs have a number of points, and only they."""
     drawn, place = study.design in DRAWN, f"{study.where}: points"
-    has = points is not None
-    require(has or not drawn, None, "a number of points", place, fix="write points = 100")
-    what = "a number of points for a design that has its own"
-    fix = f'leave it out, or write design = "{DRAWN[-1]}" (or {", ".join(DRAWN[:-1])})'
-    require(drawn or not has, points, "no points", place, what=what, fix=fix)
+    expected = f"a number of points for the designs {', '.join(DRAWN)} alone"
+    fix = "write points = 100" if drawn else "leave it out"
+    require((points is not None) == drawn, points, expected, place, fix=fix)
+
+
+def _scenario(value: Any, where: str) -> Any:
+    named = isinstance(value, str | Mapping)
+    require(named, value, "a scenario's name or table", where)
+    return value
 
 
 STUDY: Rules = {
-    "title": (rules.text, ""),
-    "scenario": (
-        rules.simple(lambda value: isinstance(value, str | Mapping), "a scenario's name or table"),
-        "walk_flat",
-    ),
-    "set": (rules.table, {}),
-    "seed": (rules.whole(0, 2**32 - 1), 0),  # that all random number generators accept
-    "variation": (rules.optional(rules.boolean), None),
-    "optimise": (rules.optional(read_optimise), None),
-    "factors": (read_factors, {}),
-    "design": (rules.names(DESIGNS), GRID),
-    "points": (rules.optional(rules.whole(1, 10**7)), None),
-    "seeds": (rules.seeds(10**7), 1),
-    "controls": (rules.texts('controls = ["kinematic", "law.py:Class"]'), list(COMPARED)),
+    "title": (Text().read, ""),
+    "scenario": (_scenario, "walk_flat"),
+    "set": (expect_table, {}),
+    "seed": (Whole().read, 0),
+    "variation": (Flag().read, None),
+    "optimise": (read_optimise, None),
+    "factors": (read_factors, ()),
+    "design": (Choice(DESIGNS).read, GRID),
+    "points": (rules.count, None),
+    "seeds": (rules.seeds, range(1)),
+    "controls": (rules.texts, list(COMPARED)),
 }
 
 
@@ -161,37 +165,35 @@ def _cases(study: Study, folder: Path) -> dict[str, Case]:
 
     They are the study's own one, those of the factor `scenario` and those of an optimisation.
     """
-    source, where = study.source, study.where
-    own = source.get("scenario", "walk_flat")
-    changes = _changes(study)
-    vary = source.get("variation", len(study.seeds) > 1 or study.optimise is not None)
-    found = {}
-    if isinstance(own, Mapping):
-        place = f"{where}: scenario"
-        found[study.title] = _case(study.title, dict(own), place, changes, where, vary=vary)
-    places = ({} if found else {own: f"{where}: scenario"}) | _scenario_places(study)
-    for name, place in places.items():
-        what, fix = "two scenarios of one name", "give the study another title"
-        require(name not in found, name, "different names", place, what=what, fix=fix)
-        table, file = _read(folder / name, name, place)
-        found[name] = _case(name, table, file, changes, where, vary=vary)
-    return found
+    own, asked = study.source.get("scenario", "walk_flat"), study.optimise
+    inline = {study.title: dict(own)} if isinstance(own, Mapping) else {}
+    varied = [factor.values for factor in study.factors if factor.name == SCENARIO_FACTOR]
+    names = [*(inline or [own]), *(str(value) for values in varied for value in values)]
+    names += [*asked.training.cases, *asked.held_out.cases] if asked is not None else []
+    return {name: _case(name, inline.get(name), study, folder) for name in dict.fromkeys(names)}
 
 
-def _scenario_places(study: Study) -> dict[str, str]:
-    """Returns the keys of the study file that name scenarios beside `scenario`, by scenario."""
-    where, asked = study.where, study.optimise
-    values = [
-        value
-        for factor in study.factors
-        if factor.name == SCENARIO_FACTOR
-        for value in factor.values
-    ]
-    places = {str(value): f"{where}: factors.scenario" for value in values}
-    if asked is not None:
-        places |= dict.fromkeys(asked.training.cases, f"{where}: optimise.training.scenarios")
-        places |= dict.fromkeys(asked.held_out.cases, f"{where}: optimise.held_out.scenarios")
-    return places
+def _case(name: str, table: dict[str, Any] | None, study: Study, folder: Path) -> Case:
+    """Makes a case from its tables, or those of a file beside the study or of a bundled scenario.
+
+    Raises StudyError.
+    """
+    changes, beside = _changes(study), folder / name
+    try:
+        if table is None:
+            table, place = read_tables(beside if os.path.isfile(beside) else name)
+        else:
+            place = "scenario"
+        table = with_values(table, changes)
+        scenario = scenario_from_table(table, where=place, given=list(changes))
+        check_scenario(scenario)
+    except HexapodError as error:
+        raise placed(error, f"{study.where}: {error.where or name}") from error
+    several = len(study.seeds) > 1 or study.optimise is not None
+    if study.source.get("variation", several) and "variation" not in table:
+        table["variation"] = asdict(STANDARD)
+    table["outputs"] = {"plots": False}  # a study keeps no recordings
+    return Case(name=name, table=table, where=place)
 
 
 def _changes(study: Study) -> dict[str, Any]:
@@ -200,60 +202,12 @@ def _changes(study: Study) -> dict[str, Any]:
     A setting that is a factor as well is refused. For a variable of an optimiser it is allowed: it
     is the value before the optimisation.
     """
-    where = f"{study.where}: set"
     changes: dict[str, Any] = {}
-    factors = {factor.name for factor in study.factors}
+    varied = [] if study.optimise else [factor.name for factor in study.factors]
     what, fix = "set and varied", "take one of them away: the factor would replace it"
-    for name, value in rules.leaves(study.source.get("set", {})):
-        rules.require_once(name, name in changes, f"{where}.{name}")
+    for name, value, place in rules.named_once(study.source.get("set", {}), f"{study.where}: set"):
+        check_settable(name, place)
+        expected = "each name in [set] or [factors]"
+        require(name not in varied, name, expected, place, what=what, fix=fix)
         changes[name] = value
-        check_settable(plain_name(name), f"{where}.{name}", kind="setting")
-        twice = study.optimise is None and plain_name(name) in factors
-        expected, place = "each name in [set] or [factors]", f"{where}.{name}"
-        require(not twice, name, expected, place, what=what, fix=fix)
     return changes
-
-
-def _case(
-    name: str,
-    table: dict[str, Any],
-    place: str,
-    changes: Mapping[str, Any],
-    where: str,
-    *,
-    vary: bool,
-) -> Case:
-    """Makes a case. Raises ScenarioError for its scenario, StudyError for a change.
-
-    Args:
-        table: the tables of the scenario.
-        place: where they come from.
-        changes: the settings of [set] by name.
-        vary: whether the standard variation is added.
-    """
-    scenario = scenario_from_table(table, where=place)
-    check_scenario(scenario, names=list(scenario.parameters))
-    try:
-        table = with_values(table, changes)
-        scenario = scenario_from_table(table, where=place, given=list(changes))
-        check_scenario(scenario, names=[plain_name(name) for name in changes])
-    except HexapodError as error:
-        key = (error.where or "").rpartition(": ")[2].removeprefix("--set ")
-        raise placed(error, f"{where}: set.{plain_name(key)}") from error
-    if vary and "variation" not in table:
-        table["variation"] = asdict(STANDARD)
-    table["outputs"] = {"plots": False}  # a study keeps no recordings
-    return Case(name=name, table=table, where=place)
-
-
-def _read(beside: Path, name: str, where: str) -> tuple[dict[str, Any], str]:
-    """Reads a scenario's tables and its place, from a file beside the study if there is one.
-
-    Raises HexapodError; for an unknown name it cites the place in the study file.
-    """
-    try:
-        return read_tables(beside if os.path.isfile(beside) else name)
-    except HexapodError as error:
-        if error.where:
-            raise
-        raise placed(error, where) from error

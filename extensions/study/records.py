@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hexapod_cosim.cosim.results.summary import Summary
-from hexapod_cosim.cosim.scenario.controls import Control, control_of
+from hexapod_cosim.cosim.scenario.controls import Control
 from hexapod_cosim.models import HexapodError
 
 Value = float | int | bool | str
@@ -20,9 +20,7 @@ GRID, LIST, RANDOM, LATIN_HYPERCUBE, SOBOL = DESIGNS
 DRAWN = (RANDOM, LATIN_HYPERCUBE, SOBOL)  # designs with a given number of points
 SCENARIO_FACTOR = "scenario"
 GAINS = "gains."  # prefix of factors that are gains of the compliant control
-FRONT = 8  # members of a Pareto front that are evaluated on the held-out runs
 WALKED = "walked"  # the share of runs that walked to the end, as a metric
-SAMPLERS = ("tpe", "nsga2", "random")
 
 
 class StudyError(HexapodError):
@@ -44,9 +42,24 @@ class Factor:
     unit: str = ""  # of the values; empty: the unit of the setting
     relative: bool = False  # whether values are multiples of the designed gain
 
+    @property
+    def label(self) -> str:
+        """The name with the unit."""
+        return f"{self.name} [{self.shown_unit}]" if self.shown_unit else self.name
+
+    @property
+    def shown_unit(self) -> str:
+        """The unit of the values."""
+        return "designed gain" if self.relative else self.unit
+
     def setting(self, value: Value) -> Value:
         """Returns the value as a scenario accepts it, with its unit."""
         return f"{value!r} {self.unit}" if self.unit else value
+
+
+def shown_value(value: Value | None) -> str:
+    """Returns the value of a factor as text."""
+    return "-" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,21 +99,20 @@ class Bound:
 
 @dataclass(frozen=True, kw_only=True)
 class Optimise:
-    """An optimisation: objectives, constraints and the runs for them."""
+    """An optimisation: the objective, constraints and the runs for them."""
 
-    metrics: tuple[str, ...]
+    metric: str
     constraints: tuple[Bound, ...]
     trials: int
     batch: int  # trials that are proposed before the result of any of them is known
-    sampler: str
     control: str
     training: Evaluation
     held_out: Evaluation
 
     @property
-    def chosen(self) -> int:
-        """Largest number of trials that are evaluated on the held-out runs."""
-        return 1 if len(self.metrics) == 1 else FRONT
+    def metrics(self) -> list[str]:
+        """The metrics of the objective and the constraints, each once."""
+        return list(dict.fromkeys([self.metric, *(bound.metric for bound in self.constraints)]))
 
     @property
     def trained(self) -> int:
@@ -108,9 +120,9 @@ class Optimise:
         return (self.trials + 1) * self.training.runs
 
     @property
-    def most(self) -> int:
-        """Largest number of all runs."""
-        return self.trained + (1 + self.chosen) * self.held_out.runs
+    def count(self) -> int:
+        """Number of all runs; the unchanged and the best settings have held-out runs."""
+        return self.trained + 2 * self.held_out.runs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,27 +135,22 @@ class Study:
     design: str
     points: int  # of a drawn design
     seeds: Sequence[int]
-    controls: tuple[str, ...]  # labels; an optimisation has one
-    texts: Mapping[str, str]  # of all controls, by label; see scenario.controls
+    laws: tuple[Control, ...]  # its controls; an optimisation has one
     seed: int  # of the design and the optimiser
     optimise: Optimise | None
     source: Mapping[str, Any]  # the tables of the file
     where: str
 
     @property
-    def chosen_controls(self) -> tuple[Control, ...]:
-        """The controls of its runs, as records."""
-        return tuple(control_of(self.texts[label]) for label in self.controls)
+    def controls(self) -> tuple[str, ...]:
+        """The labels of its controls."""
+        return tuple(control.label for control in self.laws)
 
     @property
     def gains_text(self) -> str | None:
         """The text of the first control that has gains; None without one."""
-        texts = [
-            control.text
-            for control in self.chosen_controls
-            if control.is_builtin and control.name != "kinematic"
-        ]
-        return texts[0] if texts else None
+        builtin = (control for control in self.laws if control.is_builtin)
+        return next((one.text for one in builtin if one.name != "kinematic"), None)
 
 
 @dataclass(frozen=True, kw_only=True)

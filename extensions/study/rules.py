@@ -1,7 +1,7 @@
-"""Rules for the values of a study file: each reads a value or raises StudyError.
+"""Rules for the values of a study file: each reads a value or raises HexapodError.
 
-A table of a file is read by a table of rules, from keys to a rule and a default. A rule is called
-with None for a missing key without a default, and refuses it as missing.
+A table of a file is read by a table of rules, from keys to a rule and a default, or REQUIRED. A
+rule is a function, such as the `read` of models/schema.py's types.
 """
 
 from __future__ import annotations
@@ -12,12 +12,14 @@ from typing import Any
 
 from hexapod_cosim.extensions.study.records import StudyError
 from hexapod_cosim.models import unknown_name
+from hexapod_cosim.models.schema import Texts, Whole, expect_table
 
 Rule = Callable[[Any, str], Any]  # from a value and its place to what it means
 Rules = Mapping[str, tuple[Rule, Any]]
 
-LARGEST = 2**63 - 1  # integer of TOML and of a column
-MAX_LENGTH = 1000  # characters of a text
+REQUIRED = object()  # in place of a default
+LARGEST = 2**63 - 1  # integer of a column
+PARAMETERS = "parameters."  # an optional prefix of names
 
 
 def require(
@@ -42,29 +44,19 @@ def require_known(names: Iterable[str], known: Iterable[str], where: str, kind: 
             raise unknown_name(kind, name, list(known), where=where, error=StudyError)
 
 
-def place_of(where: str, key: str) -> str:
-    """Returns the place of a key in a table at a place, as in "study.toml: optimise.metric"."""
-    return f"{where}{'.' if ': ' in where else ': '}{key}"
-
-
 def read_table(value: Any, rules: Rules, where: str) -> dict[str, Any]:
-    """Returns the values of a table by its rules, with their defaults."""
-    table(value, where)
-    require_known(value, rules, where, "key")
-    return {
-        key: rule(value.get(key, default), place_of(where, key))
-        for key, (rule, default) in rules.items()
-    }
+    """Returns the values of a table by its rules, with their defaults.
 
-
-def simple(holds: Callable[[Any], bool], expected: str, fix: str = "correct it") -> Rule:
-    """Returns the rule of a value that is taken as it is when a condition holds."""
-
-    def read(value: Any, where: str) -> Any:
-        require(holds(value), value, expected, where, fix=fix)
-        return value
-
-    return read
+    `where`: the file, or the file and the key of the table.
+    """
+    require_known(expect_table(value, where), rules, where, "key")
+    before, found = f"{where}." if ": " in where else f"{where}: ", {}
+    for key, (rule, default) in rules.items():
+        place, what = before + key, "missing key"
+        given = key in value or default is not REQUIRED
+        require(given, None, "a value", place, what=what, fix=f"add `{key} = ...`")
+        found[key] = rule(value[key], place) if key in value else default
+    return found
 
 
 def is_number(value: Any) -> bool:
@@ -72,79 +64,36 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _different_texts(value: Any) -> bool:
-    listed = isinstance(value, list) and all(isinstance(item, str) for item in value)
-    return listed and 0 < len(value) == len(set(value))
+def number(value: Any, where: str) -> float:
+    """Returns a finite number."""
+    require(is_number(value), value, "a finite number", where)
+    return float(value)
 
 
-text = simple(lambda value: isinstance(value, str), "a text in quotes")
-boolean = simple(lambda value: isinstance(value, bool), "true or false", "leave the quotes out")
-table = simple(lambda value: isinstance(value, Mapping), "a table", "write it as [section]")
+def texts(value: Any, where: str) -> tuple[str, ...]:
+    """Returns the texts of a list: one or more, all different."""
+    found = Texts().read(value, where)
+    require(0 < len(found) == len(set(found)), value, "a list of different texts", where)
+    return found
 
 
-def texts(example: str) -> Rule:
-    """Returns the rule of a list of one or more different texts."""
-    return simple(_different_texts, "a list of different texts", f"write {example}")
+def count(value: Any, where: str) -> int:
+    """Returns a whole number from 1."""
+    require(Whole().read(value, where) >= 1, value, "a whole number >= 1", where)
+    return int(value)
 
 
-def whole(least: int, most: int) -> Rule:
-    """Returns the rule of a whole number within bounds."""
-    return simple(
-        lambda value: is_number(value) and isinstance(value, int) and least <= value <= most,
-        f"a whole number >= {least} and <= {most}",
-    )
-
-
-def names(known: Sequence[str]) -> Rule:
-    """Returns the rule of one name, or of a list of different ones, among `known`."""
-
-    def read(value: Any, where: str) -> tuple[str, ...]:
-        listed = [value] if isinstance(value, str) else value
-        texts(f"some of {', '.join(known)}")(listed, where)
-        require_known(listed, known, where, "name")
-        return tuple(listed)
-
-    return read
-
-
-def optional(rule: Rule) -> Rule:
-    """Returns the rule of a key that may be missing."""
-    return lambda value, where: None if value is None else rule(value, where)
-
-
-def seeds(most: int) -> Rule:
-    """Returns the rule of seeds: their number, { first, count } or a list of them."""
-
-    def read(value: Any, where: str) -> Sequence[int]:
-        if isinstance(value, list):
-            different = 0 < len(value) == len(set(map(str, value)))
-            require(different, value, "different whole numbers", where, fix="write seeds = 10")
-            return tuple(whole(0, LARGEST)(item, where) for item in value)
-        if not isinstance(value, Mapping):
-            return range(whole(1, most)(value, where))
-        rules = {"count": (whole(1, most), 1), "first": (whole(0, LARGEST - most), 0)}
-        given = read_table(value, rules, where)
-        return range(given["first"], given["first"] + given["count"])
-
-    return read
-
-
-def check_plain(value: Any, where: str) -> None:
-    """Checks that JSON and a column can represent a value and all values in it."""
-    if isinstance(value, Mapping):
-        for key, item in value.items():
-            check_plain(item, place_of(where, key))
-    elif isinstance(value, list):
-        for number, item in enumerate(value):
-            check_plain(item, f"{where}[{number}]")
-    elif isinstance(value, int):
-        require(abs(value) <= LARGEST, value, "a whole number within 64 bits", where)
-    elif isinstance(value, float):
-        require(math.isfinite(value), value, "a finite number", where)
-    else:
-        plain = isinstance(value, str) and len(value) <= MAX_LENGTH and value.isprintable()
-        expected = f"a number, true, false or a printable text of at most {MAX_LENGTH} characters"
-        require(plain, value, expected, where, what="value not allowed")
+def seeds(value: Any, where: str) -> Sequence[int]:
+    """Returns seeds from their number, { first, count } or a list of them."""
+    if isinstance(value, list):
+        different = 0 < len(value) == len(set(map(str, value)))
+        require(different, value, "different whole numbers", where, fix="write seeds = 10")
+        return tuple(Whole().read(item, where) for item in value)
+    table = value if isinstance(value, Mapping) else {"count": value}
+    given = read_table(table, {"count": (count, 1), "first": (Whole().read, 0)}, where)
+    found = range(given["first"], given["first"] + given["count"])
+    require(found[-1] <= LARGEST, value, "whole numbers within 64 bits", where)
+    return found
 
 
 def _is_table(_key: str, value: Any) -> bool:
@@ -162,6 +111,15 @@ def leaves(
             yield f"{before}{key}", value
 
 
-def require_once(name: str, again: bool, where: str) -> None:
-    """Checks that a name is not there already."""
-    require(not again, name, "each name once", where, what="given twice", fix="take one away")
+def named_once(nested: Any, where: str, is_section: Callable[[str, Any], bool] = _is_table) -> Any:
+    """Yields name, value and place of the leaves of a table, without "parameters." in the names.
+
+    Raises StudyError for a name that is given twice; columns of SQL ignore the case of letters.
+    """
+    found: set[str] = set()
+    for full, value in leaves(nested, is_section=is_section):
+        name, place = full.removeprefix(PARAMETERS), f"{where}.{full}"
+        once = name.lower() not in found
+        require(once, name, "each name once", place, what="given twice", fix="take one away")
+        found.add(name.lower())
+        yield name, value, place

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.extensions.study.records import (
-    GAINS,
     SCENARIO_FACTOR,
     VALUES,
     Factor,
@@ -29,17 +28,13 @@ from hexapod_cosim.extensions.study.records import (
     StudyError,
     Value,
 )
-from hexapod_cosim.extensions.study.runs import identity
 
 RUNS = "runs.sqlite"  # its name in the study's folder
-MACHINE_METRIC = "realtime_factor"  # depends on the machine
-FIGURES = tuple(name for name in METRICS if name != MACHINE_METRIC)
-UNITS = {name: unit for name, (unit, _, _) in METRICS.items()}
+FIGURES = tuple(name for name in METRICS if name != "realtime_factor")  # not of the machine
 WALL = "wall"
 WARNING_SEPARATOR = " | "
 INTEGER, REAL, TEXT, BOOLEAN = "INTEGER", "REAL", "TEXT", "BOOLEAN"
 FLUSH_ROWS, FLUSH_SECONDS = 1024, 2.0  # a killed process loses no more than this
-ROWS_AT_ONCE = 16_384  # rows that are read into memory at a time
 BUSY_TIMEOUT = 60.0  # s    for another process that reads or writes
 
 sqlite3.register_converter(BOOLEAN, lambda text: text == b"1")
@@ -61,34 +56,27 @@ def columns_of(study: Study) -> list[Column]:
         Column("run", f"{INTEGER} PRIMARY KEY"),
         Column("point", INTEGER),
         Column("case", TEXT),
-        *(Column(factor.name, _kind_of(factor), _unit_of(factor)) for factor in factors),
+        *(Column(factor.name, _kind_of(factor), factor.shown_unit) for factor in factors),
         Column("seed", INTEGER),
         *(Column(name, TEXT) for name in ("control", "status", "reason")),
         *(Column(name, BOOLEAN) for name in ("upright", "walked")),
         Column("fallback", REAL),
         Column("warnings", TEXT),
-        *(Column(name, REAL, UNITS[name]) for name in FIGURES),
-        Column("identity", TEXT),
+        *(Column(name, REAL, METRICS[name][0]) for name in FIGURES),
         Column(WALL, REAL, "s"),
     ]
 
 
-def _unit_of(factor: Factor) -> str:
-    return "designed gain" if factor.name.startswith(GAINS) and factor.relative else factor.unit
-
-
 def _kind_of(factor: Factor) -> str:
-    kinds = {type(value) for value in factor.values} if factor.kind == VALUES else {float}
-    if kinds == {bool}:
-        return BOOLEAN
-    return REAL if kinds <= {int, float} else TEXT
+    first = factor.values[0] if factor.kind == VALUES else 0.0  # all values are of one kind
+    return BOOLEAN if isinstance(first, bool) else TEXT if isinstance(first, str) else REAL
 
 
 def row_of(result: RunResult, study: Study) -> list[Any]:
     """Returns the row of a run: its values in the order of the columns."""
     order, summary = result.order, result.summary
-    values = [
-        _cell(factor, value)
+    values: list[Value | None] = [
+        value
         for factor, value in zip(study.factors, order.values, strict=True)
         if factor.name != SCENARIO_FACTOR
     ]
@@ -107,18 +95,8 @@ def row_of(result: RunResult, study: Study) -> list[Any]:
         summary.fallback,
         WARNING_SEPARATOR.join(summary.warnings),
         *(float(value) if math.isfinite(value) else None for value in figures),
-        identity(order, study.factors),
         result.wall,
     ]
-
-
-def _cell(factor: Factor, value: Value | None) -> Value | None:
-    """Converts the value of a factor to the type of its column."""
-    if value is None or _kind_of(factor) == BOOLEAN:
-        return value
-    if _kind_of(factor) == TEXT:
-        return str(value).lower() if isinstance(value, bool) else str(value)
-    return float(value)
 
 
 class Store:
@@ -151,10 +129,9 @@ class Store:
         When this fails the rows are lost; their runs are run again when the study is resumed.
         """
         rows, self._rows, self._flushed = self._rows, [], monotonic()
-        if rows:
-            marks = ", ".join("?" * len(self.columns))
-            with self._explained(), self.database:
-                self.database.executemany(f"INSERT OR REPLACE INTO runs VALUES ({marks})", rows)
+        marks = ", ".join("?" * len(self.columns))
+        with self._explained(), self.database:
+            self.database.executemany(f"INSERT OR REPLACE INTO runs VALUES ({marks})", rows)
 
     def done(self, count: int) -> NDArray[np.bool_]:
         """Returns which of `count` runs are stored, as an array (count,)."""
@@ -162,19 +139,6 @@ class Store:
         for (run,) in self.select("SELECT run FROM runs"):
             found[run] = True
         return found
-
-    def numbers(self, first: int, end: int) -> set[int]:
-        """Returns the numbers of the stored runs from `first` to before `end`."""
-        rows = self.select("SELECT run FROM runs WHERE run >= ? AND run < ?", (first, end))
-        return {run for (run,) in rows}
-
-    def tables(self, columns: Sequence[Column]) -> Iterator[list[tuple[Any, ...]]]:
-        """Yields the columns of all runs in the order of their numbers, some rows at a time."""
-        names, begin = ", ".join(quoted(item.name) for item in columns), -1
-        text = f"SELECT run, {names} FROM runs WHERE run > ? ORDER BY run LIMIT {ROWS_AT_ONCE}"
-        while rows := self.select(text, (begin,)):
-            begin = rows[-1][0]
-            yield [row[1:] for row in rows]
 
     def select(self, text: str, values: Sequence[Any] = ()) -> list[tuple[Any, ...]]:
         """Returns the rows of a query."""
@@ -187,33 +151,21 @@ class Store:
 
     @contextmanager
     def _explained(self) -> Iterator[None]:
-        """Raises StudyError for an error of SQLite."""
+        """Raises StudyError for an error of SQLite: a full disk, or a file that is damaged."""
         try:
             yield
         except sqlite3.DatabaseError as error:
-            raise _study_error(error, self.path) from error
+            full = getattr(error, "sqlite_errorcode", 0) & 0xFF == sqlite3.SQLITE_FULL
+            raise StudyError(
+                "the disk is full" if full else "damaged results, or a file that cannot be used",
+                got=str(error),
+                fix="make room and start the study again: it goes on, all stored runs are kept"
+                if full
+                else "remove the file and start the study again: its runs are run again",
+                where=str(self.path),
+            ) from error
 
 
 def quoted(name: str) -> str:
     """Returns a name as SQL has it."""
     return '"' + name.replace('"', '""') + '"'
-
-
-def _study_error(error: sqlite3.DatabaseError, path: Path) -> StudyError:
-    """Returns the error for an error of SQLite."""
-    code = getattr(error, "sqlite_errorcode", 0) & 0xFF
-    if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
-        return StudyError(
-            "the disk is full or fails",
-            got=str(error),
-            expected="room for the results",
-            fix="make room and start the study again: it goes on, all runs stored so far are kept",
-            where=str(path.parent),
-        )
-    return StudyError(
-        "damaged results, or a file that cannot be used",
-        got=str(error),
-        expected="the file that was stored",
-        fix="check its rights, or remove it and start the study again: its runs are run again",
-        where=str(path),
-    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -11,42 +10,13 @@ import typer
 
 from hexapod_cosim.cosim.cli.failures import FELL
 from hexapod_cosim.cosim.cli.options import ControlNames, FmuFile, GainsFile, Json
-from hexapod_cosim.cosim.cli.running import given_gains
-from hexapod_cosim.cosim.cli.terminal import warn
+from hexapod_cosim.cosim.cli.running import Words, given_gains
 from hexapod_cosim.cosim.common.installation import require_pyarrow
 
 EPILOG = (
     f"A fall is a result of a study. Exit code {FELL} only when no run walked to its end "
     "and the robot fell in some of them."
 )
-MAX_WORKERS = 4096
-Workers = Annotated[
-    int | None,
-    typer.Option(
-        "--workers",
-        min=0,
-        max=MAX_WORKERS,
-        metavar="N",
-        help="Processes on this machine; default: one for each processor; 0: no other process.",
-    ),
-]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="Run on the workers of this Dask scheduler: tcp://HOST:8786.",
-    ),
-]
-StudyFolder = Annotated[
-    Path | None,
-    typer.Option(
-        "-o",
-        "--output",
-        metavar="DIR",
-        help="Folder to write, or to resume; default out/STUDY.",
-    ),
-]
 
 
 def study(
@@ -55,9 +25,25 @@ def study(
         typer.Argument(metavar="STUDY", help="A study file, or a name of `hexapod list studies`."),
     ],
     control: ControlNames = None,
-    output: StudyFolder = None,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="DIR", help="Folder to write or resume; default out/STUDY."
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=4096,
+            metavar="N",
+            help="Processes; default: one for each processor; 0: none.",
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Run on this Dask scheduler: tcp://HOST:8786."),
+    ] = None,
     fmu: FmuFile = None,
     gains: GainsFile = None,
     json: Json = False,
@@ -69,15 +55,14 @@ def study(
     """
     require_pyarrow("studies", "hexapod study")
     # imported here: it is slow, and no other command needs it
-    from hexapod_cosim.extensions.study.study import Options, run_and_report  # noqa: PLC0415
+    from hexapod_cosim.extensions.study.run import Options, run_and_report  # noqa: PLC0415
 
     options = Options(
         fmu=fmu,
         gains=given_gains(gains),
         workers=workers,
         scheduler=scheduler,
-        events=warn,
-        command=_command_line(file, control=control, fmu=fmu, gains=gains),
+        command=Words(control, [], fmu=fmu, gains=gains).command("study", file),
     )
     folder = output or Path("out") / Path(file).stem
     return run_and_report(file, folder, options, controls=control or [], json=json)
@@ -86,17 +71,6 @@ def study(
 def report_again(folder: Path) -> Sequence[Path]:
     """Writes the tables and the report of a study's folder again; returns the files."""
     require_pyarrow("studies", "hexapod report")
-    from hexapod_cosim.extensions.study.study import report_on, warn_of  # noqa: PLC0415  slow
+    from hexapod_cosim.extensions.study.run import report_on  # noqa: PLC0415  slow
 
-    found, files = report_on(folder)
-    warn_of(found)
-    return files
-
-
-def _command_line(file: str, **options: object) -> str:
-    """Returns the command line that repeats the study, with the options that were given."""
-    words = ["hexapod", "study", file]
-    for name, value in options.items():
-        for item in value if isinstance(value, list) else [value]:
-            words += [] if item is None else [f"--{name}", str(item)]
-    return shlex.join(words)
+    return report_on(folder)[1]

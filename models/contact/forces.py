@@ -30,7 +30,6 @@ from hexapod_cosim.models.contact.spheres import (
     sliding_friction_of_bodies,
 )
 from hexapod_cosim.models.friction import (
-    BRISTLE_LAWS,
     Friction,
     bristle_rate,
     friction_force,
@@ -370,7 +369,7 @@ def pair_wrenches(robot: Robot, body: Array, contacts: Contacts) -> Array:
 
 def has_bristles(state: ContactState) -> bool:
     """Returns whether a sole has bristles, those of friction or of shear in soil."""
-    return state.is_soft or state.friction.law in BRISTLE_LAWS
+    return state.is_soft or state.friction.has_bristles
 
 
 def contact_bristle_rate(state: ContactState, contact: FootContact, bristle: Array) -> Array:
@@ -399,6 +398,6 @@ def bristle_length(robot: Robot) -> float:
     """Returns the length [m] by which errors of bristles are measured; 0 without bristles."""
     if robot.soil.law != "none":
         return robot.soil.shear_displacement
-    if robot.friction.law in BRISTLE_LAWS:
+    if robot.friction.has_bristles:
         return robot.friction.presliding
     return bristle_length_of_patches(robot)

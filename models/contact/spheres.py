@@ -120,7 +120,7 @@ def standing_body_damping(robot: Robot, body: Array) -> Array:
 
 def sliding_friction_of_bodies(friction: Friction) -> Friction:
     """Returns the tanh law (eq. 35) in place of bristles, which bodies do not have."""
-    return friction if friction.law == "none" else replace(friction, law="tanh")
+    return replace(friction, law="tanh") if friction.has_bristles else friction
 
 
 def body_forces(robot: Robot, body: Array, damping: Array) -> Array:

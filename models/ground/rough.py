@@ -96,14 +96,6 @@ def sand(values: SimpleNamespace) -> Surface:
     return _surface("sand", x, y, cell, np.zeros_like(x))
 
 
-@entry(SMOOTH, "Slopes down to all sides", {**TILE, "slope": SLOPE})
-def pyramid_slope(values: SimpleNamespace) -> Surface:
-    """Returns a pyramid with a flat top at the start; a negative slope makes a hollow."""
-    x, y, cell = _nodes(values.size, values.size, values.horizontal_scale)
-    outside = np.maximum(np.abs(x), np.abs(y)) - 0.5 * values.platform_size - FLAT_CELLS * cell
-    return _surface("pyramid_slope", x, y, cell, -values.slope * np.maximum(outside, 0.0))
-
-
 @entry(
     SMOOTH,
     "Ramp up and down along +x",

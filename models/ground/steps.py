@@ -1,4 +1,4 @@
-"""Makes the surfaces of blocks in the catalogue: stairs, steps, stones, gaps, obstacles, rubble.
+"""Makes the surfaces of blocks in the catalogue: stairs, steps, stones, gaps, rubble.
 
 Each function gets the checked parameters of its surface and returns a `Surface` with height 0 at
 the world's origin, where the robot starts. Widths are rounded to whole blocks; where a surface has
@@ -36,8 +36,6 @@ from hexapod_cosim.models.ground.surface import Surface
 
 BLOCKS: Entries = {}  # the surfaces by name
 Mask = NDArray[np.bool_]
-
-TILT = 3  # obstacles have heights -1, -1/2, 1/2, 1 of the largest: 4 choices
 
 
 def _cells(size_x: float, size_y: float, cell: float) -> tuple[Array, Array]:
@@ -94,27 +92,6 @@ def stairs(values: SimpleNamespace) -> Surface:
     return _surface("stairs", x, y, cell, values.step_height * passed)
 
 
-def _pyramid(values: SimpleNamespace, name: str, sign: float) -> Surface:
-    cell = _fitting(values.step_width, values.horizontal_scale)
-    x, y = _cells(values.size, values.size, cell)
-    begin = _edge(values.platform_size, cell)
-    outside = np.maximum(np.abs(x), np.abs(y)) - begin
-    passed = _stairs_along(outside, values.step_width, np.inf)
-    return _surface(name, x, y, cell, sign * values.step_height * passed)
-
-
-@entry(BLOCKS, "Stairs down to all sides", STEPS)
-def pyramid_stairs(values: SimpleNamespace) -> Surface:
-    """Returns stairs that lead down from the platform to all sides."""
-    return _pyramid(values, "pyramid_stairs", -1.0)
-
-
-@entry(BLOCKS, "Stairs up to all sides", STEPS)
-def inverted_pyramid_stairs(values: SimpleNamespace) -> Surface:
-    """Returns stairs that lead up from the platform to all sides."""
-    return _pyramid(values, "inverted_pyramid_stairs", 1.0)
-
-
 def _one_step(values: SimpleNamespace, name: str, sign: float) -> Surface:
     cell = values.horizontal_scale
     x, y = _cells(values.size, values.size, cell)
@@ -132,17 +109,6 @@ def step_up(values: SimpleNamespace) -> Surface:
 def step_down(values: SimpleNamespace) -> Surface:
     """Returns one step down along +x, at the platform's edge."""
     return _one_step(values, "step_down", -1.0)
-
-
-@entry(BLOCKS, "Kerbs across x", STEPS)
-def steps(values: SimpleNamespace) -> Surface:
-    """Returns kerbs across x: step_width high, step_width low, and so on."""
-    cell = _fitting(values.step_width, values.horizontal_scale)
-    x, y = _cells(values.size, values.size, cell)
-    begin = _edge(values.platform_size, cell)
-    passed = np.floor((np.abs(x) - begin) / values.step_width)
-    high = (passed >= 0.0) & (np.mod(passed, 2.0) == 0.0)
-    return _surface("steps", x, y, cell, np.where(high, values.step_height, 0.0))
 
 
 @entry(
@@ -203,37 +169,6 @@ def gaps(values: SimpleNamespace) -> Surface:
     block = np.floor((np.abs(x) - begin) / cell)
     open_ = (block >= 0.0) & (np.mod(block, period) < width)
     return _surface("gaps", x, y, cell, np.where(open_, -values.depth, 0.0))
-
-
-@entry(
-    BLOCKS,
-    "Flat rectangles above and below the ground",
-    {
-        **RANDOM_TILE,
-        "max_height": length((0.025, 0.125), "largest height"),
-        "min_size": length(0.2, "shortest edge"),
-        "max_size": length(0.6, "longest edge"),
-        "num_rects": count(40, "number of rectangles"),
-    },
-)
-def discrete_obstacles(values: SimpleNamespace) -> Surface:
-    """Returns num_rects flat rectangles at random places, higher or lower than the ground.
-
-    Their edges are from min_size to max_size, their heights -1, -1/2, 1/2 or 1 of max_height.
-    """
-    cell = values.horizontal_scale
-    x, y = _cells(values.size, values.size, cell)
-    generator, height = np.random.default_rng(values.seed), np.zeros_like(x)
-    low, high = (max(round(size / cell), 1) for size in (values.min_size, values.max_size))
-    levels = 0.5 * values.max_height * np.array([-2.0, -1.0, 1.0, 2.0])
-    for _ in range(values.num_rects):
-        width, depth = generator.integers(low, max(high, low), size=2, endpoint=True).tolist()
-        row = int(generator.integers(0, max(len(x) - depth, 0), endpoint=True))
-        column = int(generator.integers(0, max(x.shape[1] - width, 0), endpoint=True))
-        level = levels[int(generator.integers(0, TILT, endpoint=True))]
-        height[row : row + depth, column : column + width] = level
-    height[_platform(x, y, values.platform_size)] = 0.0
-    return _surface("discrete_obstacles", x, y, cell, height)
 
 
 def random_tops(values: SimpleNamespace, x: Array, y: Array, cell: float) -> Array:

@@ -5,7 +5,6 @@ Example: `make_surface("stairs", {"step_height": 0.02})`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache, lru_cache
@@ -91,7 +90,6 @@ def _made(
     values = with_defaults(entry.parameters, dict(given), where)
     _check_size(values, where)
     surface = entry.make(SimpleNamespace(**values))
-    _check_room(surface, values, where)
     if "soil" in values:
         check_soil(values["soil"], f"{where}.soil")
         surface = with_soil(surface, values["soil"])
@@ -109,32 +107,6 @@ def _check_size(values: Mapping[str, Any], where: str) -> None:
         expected = f"2 to {round(MOST_NODES**0.5)} cells along an edge"
         fix = "change terrain.size or terrain.horizontal_scale"
         raise RobotError(what, got=got, expected=expected, fix=fix, where=where)
-
-
-def _check_room(surface: Surface, values: Mapping[str, Any], where: str) -> None:
-    """Raises RobotError where the map has no room beside the platform, or for all steps."""
-    if "platform_size" not in values:
-        return
-    cell, platform = surface.cell, values["platform_size"]
-    begin = cell * math.ceil(0.5 * platform / cell - 1e-9)
-    if begin > surface.extent[1] - 0.5 * cell:
-        what = "the flat platform covers the whole map"
-        got = f"size {values['size']:g} m, platform_size {platform:g} m"
-        expected = f"a size of at least {2.0 * (begin + cell):.6g} m"
-        fix = "enlarge terrain.size, or reduce terrain.platform_size"
-        raise RobotError(what, got=got, expected=expected, fix=fix, where=where)
-    wanted = values.get("num_steps", 0)
-    fit = round(float(surface.height.max()) / values["step_height"]) if wanted else 0
-    if fit < wanted:
-        size = math.ceil(20.0 * (begin + wanted * values["step_width"])) / 10.0
-        raise RobotError(
-            "more steps than the map has room for",
-            got=f"num_steps {wanted} of {values['step_width']:g} m on a map of "
-            f"{values['size']:g} m",
-            expected=f"at most {fit} steps",
-            fix=f"set terrain.size={size:g}, or fewer or narrower steps",
-            where=where,
-        )
 
 
 PLACED = ("height", "incline", "heading")  # keys of every kind

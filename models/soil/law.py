@@ -71,17 +71,8 @@ def column_slope(foot: Foot, z: float, n: float) -> float:
     return float(2.0 * math.pi * (whole + max(z - R, 0.0) ** (n + 1.0) / (n + 1.0)))
 
 
-def column_work(foot: Foot, z: float, n: float) -> float:
-    """Returns the integral of `column_sum` from 0 to z."""
-    if foot.pad_radius > 0.0:
-        return float(soil_area(foot) * z ** (n + 1.0) / (n + 1.0))
-    R, pair, triple = foot.radius, (n + 1.0) * (n + 2.0), (n + 1.0) * (n + 2.0) * (n + 3.0)
-    whole = R * z ** (n + 2.0) / pair - z ** (n + 3.0) / triple
-    return float(2.0 * math.pi * (whole + max(z - R, 0.0) ** (n + 3.0) / triple))
-
-
-def granular_sum(soil: Soil, foot: Foot, z: float) -> tuple[float, float, float]:
-    """Returns force [N], slope [N/m] and work [J] of granular media at depth z [m] (eq. 42).
+def granular_sum(soil: Soil, foot: Foot, z: float) -> tuple[float, float]:
+    """Returns force [N] and slope [N/m] of granular media at depth z [m] (eq. 42).
 
     A surface element under the angle beta resists with side + (down - side) cos^2 beta times its
     depth; the lower half of the sphere counts.
@@ -89,18 +80,16 @@ def granular_sum(soil: Soil, foot: Foot, z: float) -> tuple[float, float, float]
     down, side = soil.resistance * soil.alpha_down, soil.resistance * soil.alpha_side
     if foot.pad_radius > 0.0:
         A = soil_area(foot)
-        return down * A * z, down * A, down * A * z * z / 2.0
+        return down * A * z, down * A
     R, e, rest = foot.radius, z / foot.radius, down - side
     if e <= 1.0:
         o = 1.0 - e
         force = side * e**2 / 2 + rest * (o * o * e**2 / 2 + 2 * o * e**3 / 3 + e**4 / 4)
         slope = side * e + rest * (o * o * e + o * e**2 + e**3 / 3)
-        work = side * e**3 / 6 + rest * (e**3 / 6 - e**4 / 12 + e**5 / 60)
     else:
         force = side * (e - 0.5) + rest * ((e - 1.0) / 3 + 0.25)
         slope = side + rest / 3
-        work = side * (1 / 6 + (e * e - e) / 2) + rest * (0.1 + (e - 1.0) / 4 + (e - 1.0) ** 2 / 6)
-    return 2 * math.pi * R**3 * force, 2 * math.pi * R**2 * slope, 2 * math.pi * R**4 * work
+    return 2 * math.pi * R**3 * force, 2 * math.pi * R**2 * slope
 
 
 def virgin_force(soil: Soil, foot: Foot, z: float) -> float:
@@ -113,21 +102,16 @@ def virgin_slope(soil: Soil, foot: Foot, z: float) -> float:
     return _virgin(soil, foot, z, column_slope, 1)
 
 
-def virgin_work(soil: Soil, foot: Foot, z: float) -> float:
-    """Returns the work [J] of F_v from 0 to z [m]."""
-    return _virgin(soil, foot, z, column_work, 2)
-
-
 def _virgin(
     soil: Soil, foot: Foot, z: float, column: Callable[[Foot, float, float], float], granular: int
 ) -> float:
-    """Returns force, slope or work of the virgin curve at z > 0.
+    """Returns force or slope of the virgin curve at z > 0.
 
     Args:
         soil: the soil.
         foot: the foot.
         z: depth [m].
-        column: `column_sum`, `column_slope` or `column_work`.
+        column: `column_sum` or `column_slope`.
         granular: index of the same quantity in `granular_sum`.
     """
     if soil.law == "bekker":

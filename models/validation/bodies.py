@@ -1,4 +1,4 @@
-"""Checks a robot as a whole, and its bodies: inertias, links, limits, rotors and stance."""
+"""Checks a robot as a whole, and its bodies: inertias, links, limits and stance."""
 
 from __future__ import annotations
 
@@ -100,34 +100,6 @@ def _check_link(link: Link, where: str) -> None:
         raise RobotError(what, got=got, expected=expected, fix=fix, where=where + ".angle_min")
 
 
-def check_rotors(robot: Robot, at: str) -> None:
-    """Raises RobotError for rotors that are heavier than the bodies which contain them.
-
-    The inertia of each about its own axis is J_r/n^2, and the torso has six.
-    """
-    ratio, compliance = robot.servo.gear_ratio, 0.0
-    if ratio == 0.0:
-        return
-    for leg in robot.legs:
-        c, s = math.cos(leg.hip_yaw), math.sin(leg.hip_yaw)
-        hip = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ leg.links[0].axis
-        carriers = [(robot.torso.inertia, hip, len(robot.legs))]
-        carriers += [(leg.links[k].inertia, np.array(leg.links[k + 1].axis), 1) for k in range(2)]
-        for inertia, axis, count in carriers:
-            form = float(axis @ np.linalg.solve(inertia_matrix(inertia), axis))
-            compliance = max(compliance, count * form)
-    if robot.servo.rotor_inertia * compliance >= ratio**2:
-        least = math.sqrt(robot.servo.rotor_inertia * compliance)
-        raise RobotError(
-            "rotors heavier than the bodies that contain them",
-            got=ratio,
-            expected=f"0, or a size above {least:.3g}: rotor_inertia/gear_ratio^2 is a rotor's "
-            "inertia about its own axis",
-            fix="give servo.gear_ratio as turns of the rotor for one of the joint",
-            where=at + "servo.gear_ratio",
-        )
-
-
 def check_stance(robot: Robot, at: str) -> None:
     """Checks that all feet of the stance reach one plane below the hips. Raises RobotError."""
     feet = foot_positions(robot, robot.stance)
@@ -195,7 +167,6 @@ def check_robot(robot: Robot, *, where: str | None = None) -> None:
         raise RobotError("wrong legs", got=got, expected=expected, fix=fix, where=at + "legs")
     for leg in robot.legs:
         check_leg(leg, f"{at}legs.{leg.name}")
-    check_rotors(robot, at)
     check_stance(robot, at)
 
 

@@ -1,5 +1,6 @@
-"""Checks settings of laws that concern more than one number: contact, friction, ground, solver,
-servos.
+"""Checks settings of laws that concern more than one number: friction, ground, soil, servos.
+
+The plant checks further ones when it starts (plant_fmu/src/robot/validation.c).
 """
 
 from __future__ import annotations
@@ -7,7 +8,7 @@ from __future__ import annotations
 import math
 
 from hexapod_cosim.models.errors import RobotError
-from hexapod_cosim.models.friction import STATIC_LAWS, Friction
+from hexapod_cosim.models.friction import LAWS, Friction
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.valleys import tightest_valley
 from hexapod_cosim.models.records import BodyContact, Robot, Servo
@@ -96,27 +97,8 @@ def check_soil(robot: Robot, at: str) -> None:
         raise RobotError(what, got=got, expected=expected, fix=fix, where=at + "soil.stiffness")
 
 
-DISSIPATIVE_LAWS = ("exact_restitution", "flores", "lankarani_nikravesh", "hunt_crossley")
-
-
 def check_laws(robot: Robot, at: str) -> None:
     """Checks the settings of all laws of a robot. Raises RobotError."""
-    contact, solver = robot.contact, robot.solver
-    if contact.law in DISSIPATIVE_LAWS and contact.restitution <= 0.0:
-        fix = "give a positive value, or choose the hertz or constant_damping law"
-        raise RobotError(
-            "no finite damping for this law",
-            got=contact.restitution,
-            expected="restitution > 0",
-            fix=fix,
-            where=at + "contact.restitution",
-        )
-    if solver.method == "rk4" and solver.step <= 0.0:
-        what = "rk4 has no error control"
-        got = solver.step
-        expected = "a fixed step > 0 s"
-        fix = "set solver.step"
-        raise RobotError(what, got=got, expected=expected, fix=fix, where=at + "solver.step")
     check_soil(robot, at)
     check_servo(robot.servo, at)
     check_static_friction(robot.friction, at + "friction.mu_static")
@@ -136,8 +118,8 @@ def check_static_friction(friction: Friction, where: str) -> None:
         what = "static friction below kinetic"
         fix = "raise it or leave it out"
         raise RobotError(what, got=static, expected=f"at least mu = {mu:g}", fix=fix, where=where)
-    if friction.law not in STATIC_LAWS:
-        laws = " or ".join(STATIC_LAWS)
+    if not friction.has_friction:
+        laws = " or ".join(name for name, law in LAWS.items() if law.has_friction)
         what = "static friction that has no effect"
         got = f"{static:g} with the law {friction.law}"
         expected = f"friction.law = {laws}" if laws else f"mu = {mu:g}: no law uses another"
@@ -162,73 +144,22 @@ def check_body_contact(body: BodyContact, where: str) -> None:
         expected = "at least one of them > 0 m"
         fix = "give the robot's sizes, or leave body.contact off"
         raise RobotError(what, got=got, expected=expected, fix=fix, where=where + ".contact")
-    if body.self_contact == "force" and not any((body.knee_radius, body.shank_radius)):
-        what = "forces between legs without a radius"
-        got = "knee_radius and shank_radius of 0"
-        expected = "at least one of them > 0 m: they are those of femurs and tibias"
-        fix = "give the robot's radii, or set body.self_contact to off or warn"
-        raise RobotError(what, got=got, expected=expected, fix=fix, where=where + ".self_contact")
 
 
 def check_servo(servo: Servo, at: str) -> None:
-    """Checks motor, gear and continuous torque of the servos. Raises RobotError."""
-    _check_motor(servo, at)
-    _check_gear(servo, at)
-    if servo.torque_continuous > servo.torque_max:
-        expected = f"at most torque_max = {servo.torque_max:g} N m"
-        raise RobotError(
-            "more torque for ever than at stall",
-            got=servo.torque_continuous,
-            expected=expected,
-            fix="lower it",
-            where=at + "servo.torque_continuous",
-        )
-
-
-def _check_motor(servo: Servo, at: str) -> None:
-    """Checks that a motor has its constants."""
-    motor = servo.drive == "motor"
-    if servo.winding_capacity > 0.0 and servo.housing_capacity == 0.0:
-        raise RobotError(
-            "a housing without heat capacity",
-            got=servo.housing_capacity,
-            expected="a number > 0 [J/K] where winding_capacity is",
-            fix="give servo.housing_capacity",
-            where=at + "servo.housing_capacity",
-        )
-    coolest = max(servo.derate_temperature, servo.air_temperature)
-    if servo.temperature_max <= coolest:
-        raise RobotError(
-            "windings that are never too hot",
-            got=servo.temperature_max,
-            expected=f"more than {coolest:g} K, derate_temperature and air_temperature",
-            fix="raise servo.temperature_max",
-            where=at + "servo.temperature_max",
-        )
+    """Checks the constants of motors and the continuous torque. Raises RobotError."""
     for key in ("voltage", "torque_constant", "resistance"):
-        if motor and not getattr(servo, key) > 0.0:
+        if servo.drive == "motor" and not getattr(servo, key) > 0.0:
             what = "a motor without its constants"
             got = getattr(servo, key)
             expected = "a number > 0 with the drive motor"
             fix = f"give servo.{key}, or a servo of `hexapod list servos` as servo.model"
             raise RobotError(what, got=got, expected=expected, fix=fix, where=at + f"servo.{key}")
-
-
-def _check_gear(servo: Servo, at: str) -> None:
-    """Checks that an elastic gear has a rotor, and that play is in an elastic gear."""
-    if servo.gear_stiffness > 0.0 and servo.rotor_inertia == 0.0:
+    if servo.torque_continuous > servo.torque_max:
         raise RobotError(
-            "elastic gear without a rotor",
-            got=servo.rotor_inertia,
-            expected="rotor_inertia > 0 with gear_stiffness, whose gear moves the rotor",
-            fix="give servo.rotor_inertia, or set servo.gear_stiffness to 0",
-            where=at + "servo.rotor_inertia",
-        )
-    if servo.backlash > 0.0 and servo.gear_stiffness == 0.0:
-        raise RobotError(
-            "play in a rigid gear",
-            got=servo.gear_stiffness,
-            expected="gear_stiffness > 0 with backlash, whose teeth meet elastically",
-            fix="give servo.gear_stiffness, or set servo.backlash to 0",
-            where=at + "servo.gear_stiffness",
+            "more torque for ever than at stall",
+            got=servo.torque_continuous,
+            expected=f"at most torque_max = {servo.torque_max:g} N m",
+            fix="lower it",
+            where=at + "servo.torque_continuous",
         )

@@ -207,7 +207,8 @@ void hx_contact_release(hxContactState *contact) {
     contact->cell[0][slot] = contact->cell[1][slot] = -1.0;
 }
 
-hxSoil hx_contact_soil(const hxContactState *contact, int row, int slot) {
+/* Returns the soil on which a contact touched down. */
+static hxSoil soil_of(const hxContactState *contact, int row, int slot) {
   hxSoil soil;
   double numbers[HX_SOIL_SIZE];
   for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = contact->soil[hx_soil_row(row)][i][slot];
@@ -220,7 +221,7 @@ hxSoil hx_contact_soil(const hxContactState *contact, int row, int slot) {
 static void start_in_soil(const hxDepths *depths, int row, hxContactState *contact) {
   const int soft = hx_soil_row(row);
   for (int slot = 0; slot < hx_slots_of(row); ++slot) {
-    const hxSoil soil = hx_contact_soil(contact, row, slot);
+    const hxSoil soil = soil_of(contact, row, slot);
     if (contact->closed[row][slot] != 0.0 && contact->on_soil[soft][slot] != 0.0)
       contact->plastic[soft][slot] = hx_soil_plastic_depth(&soil, depths->delta[row][slot]);
   }
@@ -239,6 +240,22 @@ void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactSta
     if (model->has_soil && hx_may_sink(row)) start_in_soil(depths, row, contact);
   }
   if (hx_has_cells(model)) hold_cells(model, depths, contact);
+}
+
+void hx_contact_tune(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
+  for (int k = 0; k < model->listed; ++k) {
+    const int row = model->row[k];
+    for (int slot = 0; slot < hx_slots_of(row); ++slot) {
+      const double *material = material_under(model, depths, row, slot);
+      const double impact_speed = contact->impact_speed[row][slot];
+      if (contact->closed[row][slot] == 0.0) continue;
+      set_ground(model, material, row, slot, contact);
+      contact->damping[row][slot] = hx_contact(model->contact_law)->damping(model, impact_speed);
+      if (hx_may_sink(row) && contact->on_soil[hx_soil_row(row)][slot] != 0.0 && row != HX_TORSO)
+        set_soil(model, material, row, slot, hx_soil_shape(row, 0), contact);
+    }
+    fill_contact_slots(contact, row);
+  }
 }
 
 void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion) {

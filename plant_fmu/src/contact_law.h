@@ -27,9 +27,6 @@ void hx_contact_release(hxContactState *contact);
  */
 void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactState *contact);
 
-/* Returns the soil on which a contact touched down. */
-hxSoil hx_contact_soil(const hxContactState *contact, int row, int slot);
-
 /* Returns whether feet stand on cells of blocks. */
 int hx_has_cells(const hxModel *model);
 
@@ -56,6 +53,10 @@ int hx_contact_cross(const hxModel *model, const hxDepths *depths, hxContactStat
  * contact that does not continue opens. */
 void hx_contact_hand_over(const hxMoment *before, const hxMoment *after, int crossed,
                           hxContactState *contact);
+
+/* Sets the ground's constants of all contacts to those of a changed model; contacts that are closed
+ * keep their impact speeds. */
+void hx_contact_tune(const hxModel *model, const hxDepths *depths, hxContactState *contact);
 
 /* Sets the bristles of open feet to 0 (eq. 16). */
 void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion);

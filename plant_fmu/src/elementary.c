@@ -2,7 +2,8 @@
 
 #include <math.h>
 
-#include "ground/one_lane.h"
+#define HX_LANES 1
+#include "lanes/lanes.h"
 
 #include "ground/power.h" /* behind the numbers that it computes with */
 

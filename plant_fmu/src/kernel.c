@@ -32,9 +32,15 @@ size_t hx_scratch_size(void) {
 _Static_assert((int)HX_WORK_ALIGNMENT == (int)HX_SHARED_WORK_ALIGNMENT,
                "importers and users of hexapod.h allocate the same work space");
 
-/* Returns the part of a work space that holds the state before a call, bytes. */
+/* What a call that fails restores. */
+typedef struct {
+  hxState state;
+  hxFootprint lost[HX_FOOTPRINTS];
+} hxBefore;
+
+/* Returns the part of a work space that holds what was before a call, bytes. */
 static size_t before_size(void) {
-  return sizeof(hxState) + hx_shared_work_padding(sizeof(hxState));
+  return sizeof(hxBefore) + hx_shared_work_padding(sizeof(hxBefore));
 }
 
 size_t hx_work_size(void) { return before_size() + hx_scratch_size(); }
@@ -53,7 +59,9 @@ hxStatus hx_plant_use_work(hxPlant *plant, void *memory, size_t size) {
              hx_work_size());
     return HX_INVALID_ARGUMENT;
   }
-  plant->state_before = (hxState *)(void *)work;
+  hxBefore *before = (hxBefore *)(void *)work;
+  plant->state_before = &before->state;
+  plant->footprints.lost = before->lost;
   plant->scratch = work + before_size();
   return HX_OK;
 }

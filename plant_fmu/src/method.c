@@ -11,7 +11,6 @@ static const hxMethodRow rows[] = {
     [HX_METHOD_ROSW3] =
         {.stages = 4,
          .order = 3,
-         .error_order = 2,
          .gamma = 0.435866521508459,
          .a = {{0}, {0.8600765640643095}, {0.8279797393140516, -0.11004647855982283}, {0, 0, 1}},
          .g = {{0},
@@ -25,7 +24,6 @@ static const hxMethodRow rows[] = {
        L-stable; gamma = 1 - 1/sqrt(2) */
     [HX_METHOD_ROS2] = {.stages = 2,
                         .order = 2,
-                        .error_order = 1,
                         .gamma = 2.9289321881345248e-01,
                         .a = {{0}, {1}},
                         .g = {{0}, {-2 * 2.9289321881345248e-01}},
@@ -36,7 +34,6 @@ static const hxMethodRow rows[] = {
     [HX_METHOD_DP54] =
         {.stages = 7,
          .order = 5,
-         .error_order = 4,
          .a = {{0},
                {1.0 / 5},
                {3.0 / 40, 9.0 / 40},
@@ -48,20 +45,6 @@ static const hxMethodRow rows[] = {
          .b = {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84, 0},
          .e = {71.0 / 57600, 0, -71.0 / 16695, 71.0 / 1920, -17253.0 / 339200, 22.0 / 525,
                -1.0 / 40}},
-    /* Bogacki and Shampine, Appl. Math. Lett. 2 (1989) */
-    [HX_METHOD_BS32] = {.stages = 4,
-                        .order = 3,
-                        .error_order = 2,
-                        .a = {{0}, {1.0 / 2}, {0, 3.0 / 4}, {2.0 / 9, 1.0 / 3, 4.0 / 9}},
-                        .c = {0, 1.0 / 2, 3.0 / 4, 1},
-                        .b = {2.0 / 9, 1.0 / 3, 4.0 / 9, 0},
-                        .e = {2.0 / 9 - 7.0 / 24, 1.0 / 3 - 1.0 / 4, 4.0 / 9 - 1.0 / 3, -1.0 / 8}},
-    [HX_METHOD_RK4] = {.stages = 4,
-                       .order = 4,
-                       .error_order = 0,
-                       .a = {{0}, {1.0 / 2}, {0, 1.0 / 2}, {0, 0, 1}},
-                       .c = {0, 1.0 / 2, 1.0 / 2, 1},
-                       .b = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6}},
 };
 
 const hxMethodRow *hx_method(int method) {

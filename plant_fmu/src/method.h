@@ -21,8 +21,7 @@ enum { HX_STAGES = 7 };
  * more than a W-method's, sum b_i c_i (gamma + sum_j g_ij) = 0. */
 typedef struct hxMethodRow {
   int stages;
-  int order;
-  int error_order; /* order of the embedded method; 0: none, fixed step only */
+  int order; /* one more than the embedded method's */
   double gamma;
   double a[HX_STAGES][HX_STAGES], g[HX_STAGES][HX_STAGES];
   double c[HX_STAGES], b[HX_STAGES], e[HX_STAGES];
@@ -48,7 +47,7 @@ static inline double inverse_root(double x, int n) {
 /* Factor by which the step may change, from the error of an attempt: 0.9 error^(-1/n), 0.2 to 5
  * (eq. 23). */
 static inline double step_factor(const hxMethodRow *method, double error) {
-  const int n = method->error_order + 1;
+  const int n = method->order;
   double large = 1.0, small = 1.0;
   for (int i = 0; i < n; ++i) large *= 0.9 / 0.2, small *= 0.9 / 5.0;
   if (!(error < large)) return 0.2;
@@ -64,7 +63,7 @@ static inline double following_step(const hxMethodRow *method, double error, dou
   const double apart = 1e-9, up = (1.0 + apart) * most / (0.9 * h),
                down = (1.0 - apart) * least / (0.9 * h);
   double beyond_most = error, below_least = error; /* 0.9 error^(-1/n) >= x: error (x/0.9)^n <= 1 */
-  for (int i = 0; i <= method->error_order; ++i) beyond_most *= up, below_least *= down;
+  for (int i = 0; i < method->order; ++i) beyond_most *= up, below_least *= down;
   if (below_least >= 1.0) return least;
   if (beyond_most <= 1.0 && (1.0 + apart) * most <= 5.0 * h) return fmax(most, least);
   return fmax(fmin(most, h * step_factor(method, error)), least);

@@ -70,7 +70,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   hx_motion_from_bodies(&plant->model, (const double (*)[HX_BODY_STATE])body, &plant->state.motion);
   hx_kernel()->start(&plant->model, t, &plant->state, plant->scratch);
   /* the cells of feet on blocks are known now */
-  status = hx_plant_check_start(plant, definition, message);
+  status = hx_plant_check_start(plant, message);
   if (status != HX_OK) {
     plant->model = plant->feet;
     plant->state = *plant->state_before;

@@ -42,8 +42,20 @@ enum {
   HX_TIBIA_ROWS = HX_TORSO
 };
 
-/* Returns whether a friction law holds feet by bristles: those from HX_FRICTION_BRISTLE on do. */
-static inline int hx_is_bristle_law(int law) { return law >= HX_FRICTION_BRISTLE; }
+/* What a friction law has. Its function is in lanes/friction.h. */
+typedef struct {
+  int has_friction, has_bristles; /* forces along the ground; feet stand on bristles */
+} hxFrictionKind;
+
+static inline hxFrictionKind hx_friction_kind(int law) {
+  static const hxFrictionKind laws[] = {
+      [HX_FRICTION_TANH] = {1, 0},
+      [HX_FRICTION_NONE] = {0, 0},
+      [HX_FRICTION_BRISTLE] = {1, 1},
+      [HX_FRICTION_LUGRE] = {1, 1},
+  };
+  return laws[law];
+}
 
 /* Numbers of hxSoil (ground/soil.h), and rows of contacts that may be on soil: those of feet with
  * the ground below them, of knees, of shanks and of the torso (hx_soil_row). */
@@ -167,8 +179,8 @@ typedef struct hxCommand {
   double acceleration[HX_JOINTS][HX_SLOTS];
   double time;   /* s  time of the command, from which kinematic drives extrapolate (eq. 13) */
   double supply; /* 1  voltage of the supply over servo.voltage (eq. 53) */
-  double duty[HX_JOINTS][HX_SLOTS]; /* 1  share of the duty limit that heat leaves (eq. 52) */
-  double strength[HX_JOINTS][HX_SLOTS]; /* 1  share of its limits that a motor has */
+  double duty[HX_JOINTS][HX_SLOTS];     /* 1  share of the duty limit that heat leaves (eq. 52) */
+  double weakness[HX_JOINTS][HX_SLOTS]; /* 1  share of its limits that a motor has lost */
 } hxCommand;
 
 /* Commands that servos hold until the bus transmits the next ones, legs innermost. */
@@ -182,9 +194,9 @@ typedef struct hxBus {
 
 /* What the servos' firmware remembers, legs innermost. */
 typedef struct hxFirmware {
-  double angle[HX_JOINTS][HX_SLOTS]; /* rad    setpoints at the last command (eq. 58), */
-  double rate[HX_JOINTS][HX_SLOTS];  /* rad/s  their speed since, */
-  double time;                       /* s      and its time */
+  double angle[HX_JOINTS][HX_SLOTS];  /* rad    setpoints at the last command (eq. 58), */
+  double rate[HX_JOINTS][HX_SLOTS];   /* rad/s  their speed since, */
+  double time;                        /* s      and its time */
   double loaded[HX_JOINTS][HX_SLOTS]; /* s  of a duty above the overload limit (eq. 59), with the
                                        *    sign of the duty */
 } hxFirmware;
@@ -288,6 +300,7 @@ typedef struct hxState {
   double next_step;       /* s  step that the error control proposes next */
   double first_step;      /* s  the same for a call's first step, with new inputs */
   double stored_at_start; /* J  stored energy at the start of the energy audit */
+  double parameter_work;  /* J  given by changes of parameters since */
   double call_start;      /* s  start of the call that an event interrupted */
   double call_input;      /* 1  checksum of its input, a whole number; 0: no such call */
   double supply;          /* 1  hxCommand.supply and duty of the last call */

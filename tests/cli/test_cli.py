@@ -130,8 +130,8 @@ def test_compare_shows_all_controls_in_one_walk_and_what_gait_and_stance_give_by
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     for shown in (out, page):
         assert "compliant@chosen against kinematic@chosen" in shown
-        assert "kinematic, paper, compliant walk tripod, period 1 s" in shown
-        assert "kinematic@chosen, compliant@chosen walk amble, period 1.5 s" in shown
+        assert "kinematic, paper, compliant: tripod, period 1 s" in shown
+        assert "kinematic@chosen, compliant@chosen: amble, period 1.5 s" in shown
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -165,6 +165,9 @@ def test_the_controller_walks_and_turns_and_slips_less_than_kinematic_control(
     assert ahead.recording.vector("torso.position")[-1, 0] == pytest.approx(0.28, rel=0.05)
     ours = hexapod_cosim.simulate("walk_flat", "kinematic", settings=settings)
     assert ahead.metrics["slip_per_metre"] < 0.6 * ours.metrics["slip_per_metre"]
+    # it reports the plan of its feet, and its walk is not the robot file's
+    assert 1e-4 < ahead.metrics["foot_error_stance"] < 0.02
+    assert ahead.facts.walking.text == "own controller, figures over cycles of 1 s"
     turning = {**settings, "command.yaw_rate": 0.2, "robot": "phantomx_mk4"}
     turned = hexapod_cosim.simulate("walk_flat", law, settings=turning)
     assert turned.recording.column("torso.yaw")[-1] == pytest.approx(0.7, rel=0.05)

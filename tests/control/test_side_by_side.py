@@ -54,20 +54,6 @@ def test_four_controls_stand_in_one_table_and_one_report(
     assert "sway, by hand against kinematic" in out
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_several_terrains_and_several_controls_make_one_table(call: Call, tmp_path: Path) -> None:
-    words = ["--control", "kinematic", "--control", f"a b={CPG}"]
-    code, out, _ = call(
-        "compare", "walk_flat", "incline", *words, "--seeds", "1", *CYCLES, "-o", tmp_path / "out"
-    )
-    assert code in (0, 3)
-    rows = (tmp_path / "out" / "terrains.csv").read_text().splitlines()[1:]
-    assert [row.split(",")[:2] for row in rows] == [
-        [scenario, label] for scenario in ("walk_flat", "incline") for label in ("kinematic", "a b")
-    ]
-    assert "a b" in out
-
-
 def test_simulate_runs_each_control_into_a_folder_of_its_label(call: Call, tmp_path: Path) -> None:
     words = ["--control", "kinematic", "--control", CPG]
     code, out, _ = call(

@@ -275,7 +275,7 @@ def test_reaching_for_missing_ground_is_told_to_the_servos_as_speed() -> None:
         compliant=True,
         parts=Parts(support=False, posture=False, path=False),
     )
-    measurement = Measurement(angle=controller.stance.copy())
+    measurement = Measurement(angle=controller._out.angle_ref)  # the joints follow at once
     measurement.foot_force[:, 2] = 11.0
     measurement.foot_force[1] = 0.0
     moved = run_controller(controller, BodyCommand(), 150, measurement=measurement)[:, :2, 1]

@@ -18,7 +18,6 @@ import pytest
 from command import COMMAND, settings
 
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED
-from hexapod_cosim.cosim.results.side_by_side import read_seeds
 from hexapod_cosim.cosim.results.summary import REFUSED, Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.single_run import simulate
@@ -74,7 +73,7 @@ def test_a_run_that_fails_or_cannot_begin_says_why_and_the_others_go_on(plant_bu
         short(),
         short("command.vx=10"),
         short("robot=nowhere.toml"),
-        short("solver.method=rk4", "solver.step=0.005", endless),
+        short("solver.method=dp54", "solver.step=0.002", endless),
         short(),
     ]
     runs = list(run_batch(plans, workers=2))
@@ -173,10 +172,7 @@ def test_an_interrupted_comparison_keeps_whole_runs_and_leaves_no_process(
         process.kill()
     assert (process.returncode, out) == (130, "")
     assert "Traceback" not in err
-    assert "seeds.partial.csv" in err
     assert json.loads((folder / "run.json").read_text())["status"] == "interrupted"
-    runs = read_seeds(folder / "seeds.partial.csv")
-    assert all(run.status == COMPLETED for control in runs.values() for run in control)
     assert (folder / "kinematic" / "results.csv").is_file()
     assert not (folder / "seeds.csv").exists()
 

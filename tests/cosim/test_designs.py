@@ -13,7 +13,7 @@ from hexapod_cosim.controller import Gains, Gait, make_gait
 from hexapod_cosim.cosim.design.stance import StanceDesign, find_stance
 from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.run import gait_selection, plant
-from hexapod_cosim.cosim.run.designs import Stance, designed_gains, kept_gains, kept_stance
+from hexapod_cosim.cosim.run.designs import StanceChange, designed_gains, kept_gains, kept_stance
 from hexapod_cosim.cosim.run.plan import chosen_gains
 from hexapod_cosim.cosim.run.plant import PlantFmus
 from hexapod_cosim.cosim.scenario.reading import load_scenario
@@ -120,21 +120,21 @@ def test_a_process_packs_the_fmu_of_a_robot_once_and_a_new_binary_anew(
 
 def test_a_kept_stance_has_the_bits_of_the_designed_one(tmp_path: Path) -> None:
     robot, gait = load_robot("athena"), make_gait(load_robot("athena"), "amble")
-    stance = Stance(-1.0 / 3.0, 0.1 + 0.2)
+    stance = StanceChange(-1.0 / 3.0, 0.1 + 0.2)
     found = [kept_stance(robot, gait, lambda *_: stance, tmp_path)]
-    found.append(kept_stance(robot, gait, lambda *_: Stance(0.0, 0.0), tmp_path))
+    found.append(kept_stance(robot, gait, lambda *_: StanceChange(0.0, 0.0), tmp_path))
     assert found == [stance, stance]
 
 
 @pytest.mark.parametrize("damage", ["{", '{"outward": 1e999, "deeper": 0}', "{}"])
 def test_a_damaged_stance_of_the_cache_is_replaced(tmp_path: Path, damage: str) -> None:
     robot, gait = load_robot("athena"), make_gait(load_robot("athena"), "amble")
-    stance = Stance(0.01, -0.02)
-    kept_stance(robot, gait, lambda *_: Stance(0.0, 0.0), tmp_path)
+    stance = StanceChange(0.01, -0.02)
+    kept_stance(robot, gait, lambda *_: StanceChange(0.0, 0.0), tmp_path)
     (path,) = tmp_path.glob("stances/*.json")
     path.write_text(damage, encoding="utf-8")
     assert kept_stance(robot, gait, lambda *_: stance, tmp_path) == stance
-    assert kept_stance(robot, gait, lambda *_: Stance(0.0, 0.0), tmp_path) == stance
+    assert kept_stance(robot, gait, lambda *_: StanceChange(0.0, 0.0), tmp_path) == stance
 
 
 def test_a_walk_of_an_earlier_process_is_not_designed_again(

@@ -34,7 +34,7 @@ from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import make_result, simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
-from hexapod_cosim.cosim.scenario.records import Command, Scenario
+from hexapod_cosim.cosim.scenario.records import Command, Fault, Scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import FmuError, load_robot
 
@@ -47,6 +47,7 @@ FAULTS = (
     "{time=1.3, duration=0.2, leg='LR', joint='coxa', fault='stuck'}, "
     "{time=1.4, duration=0.2, leg='LF', joint='all', fault='weak'}, "
     "{time=1.4, duration=0.2, leg='RM', fault='noisy'}, "
+    "{time=1.5, parameter='friction.mu', value=0.4}, "
     "{time=1.6, duration=0.03, lost='command'}, {time=1.7, duration=0.02, lost='step'}]"
 )
 PUSH = "events=[{time=0.7, duration=0.103, force=[0, 12, 0], torque=[0.1, 0, 0]}]"
@@ -85,7 +86,7 @@ def in_python(scenario: Scenario, runner: Runner) -> tuple[Outcome, Result]:
             signals, plan.schedule.times, plan.schedule.rows, extra=diagnostic_columns(ours)
         )
         outcome = run(plant, signals, ours, plan.schedule, recorder, h=scenario.macro_step)
-        return outcome, make_result(plan, outcome, plant, parameters, controller={})
+        return outcome, make_result(plan, outcome, plant, parameters, engine="python")
 
 
 def steady(summary: Summary) -> Summary:
@@ -188,7 +189,7 @@ def test_a_study_may_bring_its_own_fmus(tmp_path: Path) -> None:
 def test_a_refused_step_ends_the_walk_as_in_python_and_the_next_one_begins_afresh(
     runner: Runner,
 ) -> None:
-    bad = planned("walk_flat", "solver.method=rk4", "solver.step=0.005", ENDLESS)
+    bad = planned("walk_flat", "solver.method=dp54", "solver.step=0.002", ENDLESS)
     good = runner.summary(WALKS[0], gains=gains_of(WALKS[0]))
     expected, _ = in_python(bad, runner)
     found = runner.simulate(bad)
@@ -242,6 +243,17 @@ def test_fmus_that_are_missing_or_something_else_are_refused(
         swapped = runner._controller_for(make_plan(WALKS[1])), plant
         with pytest.raises(FmuError, match="not a hexapod plant"):
             NativeMaster(*swapped)
+
+
+def test_a_run_says_which_loop_it_used_and_warns_when_it_was_not_that_in_c(runner: Runner) -> None:
+    compiled = runner.simulate(replace(WALKS[0], duration=0.2)).facts
+    broken = Fault(time=0.05, leg="LF", fault="nan")
+    other = runner.simulate(replace(WALKS[0], duration=0.2, events=(broken,))).facts
+    assert (compiled.engine, other.engine) == ("compiled", "python")
+    assert other.warnings[0] == (
+        "the run used the loop in Python: that in C does not support sensors that read NaN"
+    )
+    assert not any("loop in Python" in text for text in compiled.warnings)
 
 
 def test_an_interrupted_walk_keeps_its_rows(runner: Runner) -> None:

@@ -6,18 +6,20 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 import tomlkit
+from gains import make_gains
 
 from hexapod_cosim.controller import SWITCHES, Controller, Parts, make_gait
 from hexapod_cosim.cosim.run.gait_selection import known_robot
+from hexapod_cosim.cosim.run.plan import chosen_gains
 from hexapod_cosim.cosim.scenario import list_scenarios
 from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table, scenario_robot
 from hexapod_cosim.cosim.scenario.records import Variation
-from hexapod_cosim.models import RobotError, ScenarioError
+from hexapod_cosim.models import RobotError, ScenarioError, load_robot
 
 
 @pytest.mark.parametrize("name", list_scenarios())
@@ -336,3 +338,29 @@ def test_a_bad_file_is_reported_by_its_name(tmp_path: Path, text: str, message: 
     assert "mine.toml" in str(caught.value)
     with pytest.raises(ScenarioError, match="cannot read the scenario"):
         load_scenario(tmp_path / "missing.toml")
+
+
+def test_gains_are_set_by_their_names_in_a_gains_file() -> None:
+    names = ["gains.hold.path_rate=2", "gains.paper.damping=30"]
+    plan = load_scenario("walk_flat", overrides=["control=compliant", *names])
+    again = scenario_from_table(plan.to_table(), where="again")
+    assert plan.gains == again.gains == {"hold": {"path_rate": 2.0}, "paper": {"damping": 30.0}}
+    own = make_gains(load_robot("athena"))
+    found = chosen_gains(plan, own)
+    assert found == replace(
+        own, hold=replace(own.hold, path_rate=2.0), paper=replace(own.paper, damping=30.0)
+    )
+    assert chosen_gains(replace(plan, control="kinematic"), own) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("gains.hold.path_rat=2", "did you mean 'path_rate'"),
+        ("gains.margins.gain=2", "unknown key"),
+        ("gains.hold.path_rate=-2", "value not allowed"),
+    ],
+)
+def test_gains_that_do_not_exist_or_fit_are_refused(name: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario("walk_flat", overrides=[name])

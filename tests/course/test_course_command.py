@@ -45,7 +45,7 @@ def replayed(monkeypatch: pytest.MonkeyPatch, found: tuple[Run, ...], *, stop: b
 CHOICE = ["--split", "tune", "--seeds", "2", "--case", "rough_10", "--case", "turn", *KINEMATIC]
 
 
-def test_the_command_writes_json_runs_picture_and_report(
+def test_the_command_writes_json_runs_and_report(
     call: Call, tmp_path: Path, runs: tuple[Run, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     replayed(monkeypatch, runs, stop=False)
@@ -61,7 +61,7 @@ def test_the_command_writes_json_runs_picture_and_report(
     assert (rate["successes"], rate["runs"]) == (2, 2)
     page = (tmp_path / "out" / "report.html").read_text()
     assert "rough_10, kinematic" in page
-    assert page.count("data:image/svg+xml") == 1
+    assert page.count("color-mix") > 10
     table, _ = read_table(tmp_path / "out")
     assert repr(table.runs) == repr(runs)
     (tmp_path / "out" / "report.html").unlink()

@@ -14,9 +14,10 @@ from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, Summary
 from hexapod_cosim.extensions.course import texts
 from hexapod_cosim.extensions.course.records import BY_NAME, QUANTITIES, Case, load_course
+from hexapod_cosim.extensions.course.report import COLUMNS, panels
 from hexapod_cosim.extensions.course.runs import Run, failure_of
 from hexapod_cosim.extensions.course.statistics import Rate, median_ratio, wilson
-from hexapod_cosim.extensions.course.table import ALL, Table, judge_parts
+from hexapod_cosim.extensions.course.table import ALL, Table
 
 CONTROLS = ("before", "after")
 COURSE = load_course("judge", seeds=4)
@@ -161,38 +162,27 @@ def sweep_table(first_failures: Mapping[str, int], second_failures: Mapping[str,
     return Table(replace(COURSE, cases=cases), CONTROLS, runs)
 
 
-def part_table(with_part: Mapping[str, float], success: int = 4) -> Table:
-    """Returns a table in which every figure without the part is 1, on flat ground."""
+def test_a_control_without_a_part_is_compared_with_the_whole_one() -> None:
+    controls = ("kinematic", "compliant", "without sway")
     course = replace(COURSE, cases=(case_of("flat_tanh"),))
     runs = tuple(
-        run_of("flat_tanh", label, seed, values, "" if seed < walks else "stuck")
+        run_of("flat_tanh", control, seed, {"slip": slip})
         for seed in course.seeds
-        for label, values, walks in (("all", with_part, success), ("without x", {}, 4))
+        for control, slip in zip(controls, (4.0, 1.0, 2.0), strict=True)
     )
-    return Table(course, ("all", "without x"), runs, {"without x": "all"})
+    table = Table(course, controls, runs, {"without sway": "compliant"})
+    assert table.columns["without sway"] == ("without sway", "compliant")
+    assert table.classes["flat", "without sway"].ratio("slip").value == 2.0
 
 
-def test_a_part_pays_that_betters_a_figure_and_worsens_none() -> None:
-    (found,) = judge_parts(part_table({"slip": 0.85, "heat": 1.04}))
-    assert (found.best.kind, found.best.quantity, found.worst.quantity) == ("flat", "slip", "heat")
-    assert found.best.change == pytest.approx(-0.15)
-    assert found.pays
-
-
-@pytest.mark.parametrize(
-    ("values", "success"),
-    [({"slip": 0.95}, 4), ({"slip": 0.5, "heat": 1.06}, 4), ({"slip": 0.5}, 3)],
-)
-def test_a_part_does_not_pay_otherwise(values: Mapping[str, float], success: int) -> None:
-    (found,) = judge_parts(part_table(values, success))
-    assert not found.pays
-
-
-def test_a_part_that_betters_or_worsens_nothing_has_no_effect_there() -> None:
-    _, (row,) = texts.part_rows(part_table({"slip": 0.85, "heat": 1.004}))
-    assert row[1:3] == ["-15 % slip, flat", "none"]
-    _, (row,) = texts.part_rows(part_table({"heat": 1.04}))
-    assert row[1:] == ["none", "+4 % heat, flat", "does not pay"]
+def test_cells_are_green_where_a_figure_falls_and_orange_where_it_rises() -> None:
+    table = table_of({"flat_tanh": (1.0, 0.25), "sand": (1.0, 2.0)}, "heat")
+    rows = panels(table)["after against before"]
+    cells = {name: dict(zip(COLUMNS, cells, strict=True))["heat"] for _, name, cells in rows}
+    assert (cells["flat_tanh"].text, cells["flat_tanh"].shade) == ("-75", -1.0)
+    assert (cells["sand"].text, cells["sand"].shade) == ("+100", 0.5)
+    assert "--better" in cells["flat_tanh"].colour
+    assert "--worse" in cells["sand"].colour
 
 
 def test_tables_have_a_cell_for_every_column() -> None:

@@ -32,7 +32,7 @@ from hexapod_cosim.controller.design.paper import (
     scaled,
     shifted,
 )
-from hexapod_cosim.controller.parts import Parts
+from hexapod_cosim.controller.gains import Parts
 from hexapod_cosim.cosim.design.gains import design_for, read_requirements, standing_plants
 from hexapod_cosim.models import load_robot
 
@@ -259,7 +259,7 @@ def test_the_design_is_drawn(tmp_path: Path) -> None:
         {name: plant for name, plant in plants_of("athena").items() if "load 1" in name},
     )
     written = plot_design(load_robot("athena"), gains, plants, tmp_path)
-    assert len(written) == 8
+    assert len(written) == 6
     assert all(path.stat().st_size > 5000 for path in written)
     with pytest.raises(GainsError, match="not the robot of these gains"):
         plot_design(load_robot("phantomx_mk4"), gains, plants, tmp_path)

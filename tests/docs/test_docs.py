@@ -147,6 +147,7 @@ def test_every_variable_is_in_the_reference(reference: dict[str, str]) -> None:
             entry["name"]
             for causality in ("input", "output", "parameter", "local")
             for entry in table.get(causality, [])
+            if "record" not in entry
         ]
         text = reference[f"reference/{component}.md"]
         assert len(names) > 40

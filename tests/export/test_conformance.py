@@ -6,7 +6,7 @@ import math
 import posixpath
 import re
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -14,10 +14,14 @@ from xml.etree.ElementTree import Element
 
 import fmpy
 import pytest
+from fmi_plant import ATHENA
 from lxml import etree
 
 from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
+from hexapod_cosim.cosim.interface.model_description import render_fmi2
+from hexapod_cosim.cosim.interface.model_description3 import render_fmi3
 from hexapod_cosim.cosim.run.plan import make_setup
+from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.models import list_robots, load_robot
 
 STANDARD_HEADER = re.compile(r"fmi[23](Functions|FunctionTypes|TypesPlatform|PlatformTypes)\.h")
@@ -37,7 +41,7 @@ class Exported:
 
 
 CASES = [*((robot, 2) for robot in list_robots()), ("athena", 3), ("phantomx_mk4", 3)]
-CASES += [("controller", 2), ("controller", 3)]
+CASES += [(control, fmi) for control in CONTROLS for fmi in (2, 3)]
 
 
 @pytest.fixture(scope="module", params=CASES, ids=[f"{name}-{fmi}" for name, fmi in CASES])
@@ -46,15 +50,32 @@ def exported(
 ) -> Exported:
     name, fmi = request.param
     path = tmp_path_factory.mktemp("exported") / f"{name}.fmu"
-    if name == "controller":
-        setup = make_setup(load_robot("athena"), control="kinematic", period=0.005)
+    if name in CONTROLS:
+        setup = make_setup(load_robot("athena"), control=name, period=0.005)
         export_controller(setup, path, fmi=fmi)
     else:
         export_fmu(load_robot(name), path, fmi=fmi)
     with zipfile.ZipFile(path) as archive:
         entries = archive.infolist()
         files = {entry.filename: archive.read(entry) for entry in entries if not entry.is_dir()}
-    return Exported(fmi, entries, files, fmpy.read_model_description(str(path), validate=False))
+    # raises ValidationError for what does not follow the standard's schema
+    description = fmpy.read_model_description(
+        str(path), validate=True, validate_variable_names=False, validate_model_structure=True
+    )
+    return Exported(fmi, entries, files, description)
+
+
+def test_the_description_has_no_empty_list(exported: Exported) -> None:
+    root = ElementTree.fromstring(exported.files["modelDescription.xml"])
+    assert [child.tag for child in root if not len(child) and not child.attrib] == []
+
+
+@pytest.mark.parametrize("render", [render_fmi2, render_fmi3])
+def test_an_interface_without_types_has_no_list_of_them(render: Any) -> None:
+    units = tuple(replace(unit, type=None) for unit in ATHENA.units)
+    bare = replace(ATHENA, units=units, enumerations={})
+    assert "TypeDefinitions" in render(ATHENA).xml
+    assert "TypeDefinitions" not in render(bare).xml
 
 
 def test_every_packed_source_is_listed_and_every_listed_one_is_packed(exported: Exported) -> None:

@@ -131,22 +131,6 @@ def test_the_page_s_quick_start_runs_as_it_stands(
     assert capsys.readouterr().out.endswith("]\n")
 
 
-def test_the_page_names_every_variable_s_pattern_unit_and_choice(exported: Path) -> None:
-    with zipfile.ZipFile(exported) as archive:
-        page = archive.read("documentation/index.html").decode()
-    for pattern in ATHENA.patterns:
-        assert f"<code>{pattern.name}</code>" in page
-    for enumeration in ATHENA.enumerations.values():
-        assert all(
-            f"{number} {name}:" in page
-            for number, (name, _) in enumerate(enumeration.items, start=1)
-        )
-    counts = [
-        int(number) for number in re.findall(r'</code></td><td class="value">(\d+)</td>\n', page)
-    ]
-    assert sum(counts) == len(ATHENA.variables)
-
-
 @pytest.mark.parametrize(("fmi", "platforms"), [(2, None), (2, "sources"), (3, None)])
 def test_the_page_describes_only_what_the_archive_contains(
     plant_build: Path, tmp_path: Path, fmi: int, platforms: str | None

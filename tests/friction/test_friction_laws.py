@@ -220,24 +220,3 @@ def test_lugre_sticks_and_slips_by_the_closed_form_in_its_steep_limit(
     )
     tried = twin_law(friction) if where == "twin" else native_law(core, friction)
     assert phases(tried, size=1e3) == pytest.approx([0.408432, 0.392400], rel=STEEP)
-
-
-# an incline
-
-
-def slid(law: Law, angle: float, duration: float) -> tuple[float, float]:
-    """Returns distance [m] and speed [m/s] of a mass on an incline that is raised for a second.
-
-    duration: time after that [s].
-    """
-    x_axis = np.array([1.0, 0.0, 0.0])
-
-    def rate(t: float, y: Array) -> list[float]:
-        friction, bristle = law(y[1] * x_axis, y[2] * x_axis)
-        raised = angle * min(t, 1.0)
-        return [y[1], 9.81 * (math.sin(raised) + math.cos(raised) * friction), bristle]
-
-    end = solve_ivp(
-        rate, (0.0, 1.0 + duration), [0.0, 0.0, 0.0], "Radau", rtol=1e-7, atol=1e-11, max_step=0.1
-    ).y[:, -1]
-    return float(end[0]), float(end[1])

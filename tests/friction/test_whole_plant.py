@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 from plant import Plant
+from slopes import rates
 from states import changed, distance, lopsided, random_bodies, random_command, random_pose
-from test_laws_motion import AXIAL, COXA, FIXED, MIRRORED, OTHER_SIDE, POLAR, TURN, mirrored_command
 from test_plant_dynamics import DENSE, at
-from test_plant_stages import coefficients, rates
 from test_twin_integrator import STEP, assert_same_steps
 from test_twin_measure import H, stage_forces
 
@@ -24,6 +23,7 @@ from hexapod_cosim.models import METHODS, Leg, Link, Robot, load_robot
 from hexapod_cosim.models.contact.geometry import foot_contacts, foot_moment, standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations, joint_overruns, stop_torques
 from hexapod_cosim.models.measure import Impulses, step_works
+from hexapod_cosim.models.method import METHOD
 from hexapod_cosim.models.records import Array
 
 MORE: dict[str, Any] = {
@@ -92,11 +92,11 @@ def moments(robot: Robot, body: Array, damping: Array) -> Array:
 
 @pytest.mark.parametrize("seed", [2, 5])
 def test_losses_of_a_step_are_those_of_the_readable_equations(core: ct.CDLL, seed: int) -> None:
-    robot = everything("tanh", seed, solver={"method": "bs32", "step": H})
+    robot = everything("tanh", seed, solver={"method": "dp54", "step": H})
     command, pose = random_command(robot, seed), random_pose(robot, seed)
     plant, there = (Plant(core, robot, **pose) for _ in range(2))
     before, damping = plant.bodies, standing_damping(robot, plant.bodies)
-    m, rate = coefficients(core, "bs32"), rates(core, there, command)
+    m, rate = METHOD["dp54"], rates(core, there, command)
     k, sums = np.zeros((7, 247)), [np.zeros((6, 3)) for _ in range(5)]
     for i in range(m.stages):
         y = before.ravel() + H * m.a[i] @ k
@@ -134,27 +134,6 @@ def moved(plant: Plant, mirror: Any) -> Any:
         command = mirror(random_command(plant.robot, k, size=0.3))
         plant.step(0.03 * (k + 1), command)
     return plant.output(command)
-
-
-@pytest.mark.parametrize("law", ["tanh", "lugre"])
-def test_mirrored_commands_give_the_mirrored_motion(core: ct.CDLL, law: str) -> None:
-    robot = changed(load_robot("athena"), friction=MORE | {"law": law}, servo=STOPS)
-    robot = changed(narrowed(robot, 0.05), solver=FIXED)
-    pose = random_pose(robot, 6)
-    other = {
-        "position": pose["position"] * POLAR,
-        "quaternion": pose["quaternion"] * TURN,
-        "velocity": pose["velocity"] * POLAR,
-        "angular_velocity": pose["angular_velocity"] * AXIAL,
-        "angle": pose["angle"][OTHER_SIDE] * COXA,
-        "speed": pose["speed"][OTHER_SIDE] * COXA,
-    }
-    here = moved(Plant(core, robot, **pose), lambda command: command)
-    there = moved(Plant(core, robot, **other), mirrored_command)
-    assert there.torso.position * POLAR == pytest.approx(here.torso.position, abs=MIRRORED)
-    assert there.torso.quaternion * TURN == pytest.approx(here.torso.quaternion, abs=MIRRORED)
-    assert there.angle[OTHER_SIDE] * COXA == pytest.approx(here.angle, abs=MIRRORED)
-    assert there.energy.friction_loss == pytest.approx(here.energy.friction_loss, abs=MIRRORED)
 
 
 # Stick-slip of the whole C plant: a robot of 1 kg with locked joints on its six feet, pulled by a

@@ -137,5 +137,5 @@ def test_overlapping_legs_are_reported_once_and_only_on_request() -> None:
     assert overlap_warnings(run, {"body.self_contact": 1.0}) == []
     assert overlap_warnings(run.rows(slice(0, 2)), {"body.self_contact": 2.0}) == []
     (warning,) = overlap_warnings(run, {"body.self_contact": 2.0})
-    assert warning.startswith("legs overlapped from 1.000 s on, for 50.0% of the time: leg LF was ")
-    assert "3.2 mm inside its neighbour at 1.500 s" in warning
+    assert warning.startswith("legs overlapped from 1.000 s on, for 50.0% of the time: leg LF and ")
+    assert "its neighbour by 3.2 mm at 1.500 s" in warning

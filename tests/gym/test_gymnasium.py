@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 from typing import Any
 
 import gymnasium
@@ -21,11 +22,34 @@ pytestmark = pytest.mark.usefixtures("plant_build")
 
 
 @pytest.mark.parametrize("name", ["Hexapod-v0", "HexapodRough-v0"])
-@pytest.mark.filterwarnings("ignore:.*Box observation space.*infinity.*")
 def test_every_environment_passes_the_checks_of_gymnasium(name: str) -> None:
     env = gymnasium.make(name)
     try:
         check_env(env.unwrapped, skip_render_check=True)
+    finally:
+        env.close()
+
+
+def test_observations_are_within_finite_bounds_also_when_scales_are_large() -> None:
+    large = {"rotation": 1e6, "gravity": 3.0, "action": 1e4}
+    env = gymnasium.make("Hexapod-v0", observation=large)
+    try:
+        space = env.observation_space
+        assert isinstance(space, gymnasium.spaces.Box)
+        assert space.high[[0, 3, 6]].tolist() == [100.0, 3.0, 100.0]
+        env.reset(seed=0)
+        observation = env.step(np.ones(18, np.float32))[0]
+        assert observation in space
+        assert np.abs(observation).max() == 100.0
+    finally:
+        env.close()
+
+
+def test_the_environment_of_the_example_passes_the_checks_of_gymnasium() -> None:
+    example = runpy.run_path(str(ROOT / "examples" / "learning" / "ppo.py"))
+    env = example["make_env"]()
+    try:
+        check_env(env.unwrapped)
     finally:
         env.close()
 
@@ -202,4 +226,3 @@ def test_the_examples_of_the_page_work_as_typed(capsys: pytest.CaptureFixture[st
     for example in re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL):
         exec(example, names)
     assert "'progress'" in capsys.readouterr().out
-    assert names["picture"].shape == (360, 480, 3)

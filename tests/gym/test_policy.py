@@ -27,7 +27,13 @@ from hexapod_cosim.extensions.gym.policy import (
     symmetric_weights,
 )
 from hexapod_cosim.extensions.gym.settings import task
-from hexapod_cosim.extensions.gym.train import Progress, TrainSettings, train, training_settings
+from hexapod_cosim.extensions.gym.train import (
+    Progress,
+    TrainSettings,
+    still_rising,
+    train,
+    training_settings,
+)
 from hexapod_cosim.models import HexapodError, load_robot
 
 pytestmark = pytest.mark.usefixtures("plant_build")
@@ -137,7 +143,7 @@ def test_a_saved_policy_is_read_again_and_other_files_are_refused(
 def test_training_is_repeatable_and_leaves_the_standing_policy() -> None:
     settings = replace(training_settings(task("Hexapod-v0")), duration=0.1)
     how = TrainSettings(generations=2, pairs=2, seed=4)
-    policies = [train(settings, how, lambda _: None) for _ in range(2)]
+    policies = [train(settings, how, lambda _: None)[0] for _ in range(2)]
     first, second = (policy(np.ones(INPUTS)) for policy in policies)
     assert first.tobytes() == second.tobytes()
     assert np.abs(first - standing_policy("athena")(np.ones(INPUTS))).max() > 0.01
@@ -170,6 +176,13 @@ def test_an_interrupted_training_keeps_the_policy_of_its_last_generation() -> No
         if progress.generation == 1:
             raise KeyboardInterrupt
 
-    kept = train(settings, TrainSettings(pairs=2, seed=4), interrupt)
-    whole = train(settings, TrainSettings(pairs=2, seed=4, generations=2), lambda _: None)
+    kept, _ = train(settings, TrainSettings(pairs=2, seed=4), interrupt)
+    whole, _ = train(settings, TrainSettings(pairs=2, seed=4, generations=2), lambda _: None)
     assert kept.action_weight.tobytes() == whole.action_weight.tobytes()
+
+
+def test_training_is_too_little_while_the_returns_rise_above_their_noise() -> None:
+    noise = np.random.default_rng(0).standard_normal(40)
+    assert still_rising((noise + np.arange(40)).tolist())
+    assert not still_rising((noise + np.minimum(np.arange(40), 15)).tolist())
+    assert still_rising([1.0, 1.0])  # too few generations to tell

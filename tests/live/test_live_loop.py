@@ -18,6 +18,7 @@ from hexapod_cosim.extensions.live.messages import (
     Action,
     Change,
     Drive,
+    Leg,
     MessageError,
     Push,
     read_message,
@@ -237,6 +238,7 @@ def test_a_controller_that_raises_is_shown_and_the_loop_goes_on(side: Side, tmp_
         ('{"type": "set", "key": "gait", "value": "wave"}', Change("gait", "wave")),
         ('{"type": "set", "key": "friction", "value": 0.4}', Change("friction", 0.4)),
         (b'{"type": "do", "action": "record"}', Action("record")),
+        ('{"type": "leg", "leg": 5}', Leg(5)),
     ],
 )
 def test_each_kind_of_message_is_read(text: str | bytes, message: object) -> None:
@@ -263,6 +265,7 @@ def test_each_kind_of_message_is_read(text: str | bytes, message: object) -> Non
         '{"type": "set", "key": "gait", "value": 1}',
         '{"type": "set", "key": "friction", "value": -1}',
         '{"type": "do", "action": "jump"}',
+        '{"type": "leg", "leg": 6}',
         "[" * 4000,
     ],
 )

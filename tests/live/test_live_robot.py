@@ -207,14 +207,17 @@ def test_an_unknown_name_is_refused_and_nothing_changes(placed: LiveRobot, key: 
     np.testing.assert_array_equal(placed.signals.values, before)
 
 
-def test_a_recording_with_a_push_is_the_same_walk(placed: LiveRobot) -> None:
+def test_a_recording_with_a_push_and_a_limp_leg_is_the_same_walk(placed: LiveRobot) -> None:
     recording = Recording(placed.plan.scenario)
     turn = placed.limits.command(Drive(forward=0.4, turn=0.6, speed=0.4))
     inputs = [(WALK, NO_FORCE)] * 200 + [(turn, (0.0, 3.0, 1.0))] * 50 + [(STAND, NO_FORCE)] * 50
-    for command, force in inputs:
-        recording.note(command, force)
+    for k, (command, force) in enumerate(inputs):
+        if k in (100, 130):
+            placed.toggle_leg(4)
+        recording.note(command, force, placed.limp)
         placed.step(command, force)
     scenario = scenario_from_table(parse_toml(recording.as_toml()), where="driven.toml")
+    assert [(one.leg, one.fault) for one in scenario.servo_faults] == [("RM", "limp")]
     assert scenario.duration == pytest.approx(300 * 0.005)
     assert len(scenario.commands) == 3
     assert [push.force for push in scenario.pushes] == [(0.0, 3.0, 1.0)]

@@ -115,19 +115,9 @@ def test_stairs_have_the_height_and_the_tread_that_are_asked_for() -> None:
     assert ground_height(terrain, 1.9, 1.0) == pytest.approx(0.15)
 
 
-@pytest.mark.parametrize(("name", "sign"), [("pyramid_stairs", -1), ("inverted_pyramid_stairs", 1)])
-def test_pyramids_rise_and_fall_to_all_sides(name: str, sign: int) -> None:
-    terrain = on_grid(make_surface(name, {"step_height": 0.03}))
-    for x, y in ((0.41, 0.0), (-0.41, 0.0), (0.0, 0.41), (0.3, -0.41)):
-        assert ground_height(terrain, x, y) == pytest.approx(sign * 0.03)
-    assert ground_height(terrain, 0.56, 0.0) == pytest.approx(sign * 0.06)
-
-
-def test_a_ramp_and_a_pyramid_have_their_slope() -> None:
+def test_a_ramp_has_its_slope() -> None:
     ramp = on_grid(make_surface("ramp", {"slope": 0.2}))
     assert ground_height(ramp, 0.9, 0.3) - ground_height(ramp, 0.7, 0.3) == pytest.approx(0.04)
-    hill = on_grid(make_surface("pyramid_slope", {"slope": 0.2}))
-    assert ground_height(hill, 0.0, 1.5) - ground_height(hill, 0.0, 1.0) == pytest.approx(-0.1)
 
 
 def test_a_wave_has_its_amplitude_and_its_length() -> None:
@@ -173,8 +163,6 @@ REFUSED: list[tuple[str, dict[str, Any], str]] = [
     ("rubble", {"patch": [{"x": 0.0, "y": 0.0, "size": 1.0, "soil": "dry_send"}]}, "'dry_sand'"),
     ("sand", {"soil": "moon"}, "unknown soil"),
     ("heightfield", {}, "file"),
-    ("stairs", {"size": 0.2}, r"covers the whole map: got 'size 0\.2 m.*at least 0\.9 m"),
-    ("stairs", {"num_steps": 100}, r"on a map of 4 m', expected at most 11 steps; .*size=30\.8"),
 ]
 
 

@@ -116,7 +116,7 @@ def test_on_uneven_ground_no_foot_begins_deeper_than_on_level_ground() -> None:
 
 ALL = 100.0  # m    a limit that no valley here reaches
 BRUTE = 0.01  # of the radius, of a search with places 1/30 cell apart
-SMOOTH = ("dune", "pyramid_slope", "ramp", "random_uniform", "wave")  # with a difficulty
+SMOOTH = ("dune", "ramp", "random_uniform", "wave")  # with a difficulty
 
 
 def rough(seed: int, rows: int = 12, columns: int = 9) -> Surface:

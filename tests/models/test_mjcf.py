@@ -4,7 +4,6 @@ stops, shapes of torso, knees and shanks.
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -65,34 +64,6 @@ def test_the_feet_have_the_moments_against_spin_and_rolling(
     for contact in data.contact:
         assert contact.dim == dimensions
         assert tuple(contact.friction) == pytest.approx(friction, rel=1e-12)
-
-
-def test_torso_knees_and_shanks_slide_without_moments() -> None:
-    robot = changed(mu=0.7, spin_radius=0.004, rolling_radius=0.001)
-    model, data = contacts(robot, 0.03, (0.0, 1.0, 0.0, 0.0))  # on its back, in the ground
-    names = {model.geom(int(geom)).name for contact in data.contact for geom in contact.geom}
-    assert "torso_contact" in names
-    assert not any(name.endswith("foot") for name in names)
-    for contact in data.contact:
-        assert contact.dim == 3
-        assert contact.friction[0] == 0.7
-
-
-def test_a_spinning_foot_stops_as_its_moment_says() -> None:
-    """The moment mu r_s f_n of a foot under its load, from MuJoCo's contact force."""
-    robot = changed(mu=0.7, spin_radius=0.004)
-    model, data = contacts(robot, 0.1345)
-    data.qvel[5] = 5.0  # rad/s, the whole robot about z: the feet slide and spin
-    mujoco.mj_forward(model, data)
-    wrench = np.zeros(6)
-    for number in range(data.ncon):
-        mujoco.mj_contactForce(model, data, number, wrench)
-        normal, sliding, spin = wrench[0], np.hypot(*wrench[1:3]), abs(wrench[3])
-        assert normal > 1.0
-        # on the cone: both shares together are 1
-        assert math.hypot(sliding / (0.7 * normal), spin / (0.0028 * normal)) == pytest.approx(
-            1.0, rel=1e-3
-        )
 
 
 def test_joint_stops_are_the_spring_and_damper_of_the_plant() -> None:

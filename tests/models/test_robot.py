@@ -187,11 +187,6 @@ BAD: list[tuple[str, Callable[[Table], None], list[str]]] = [
     ),
     ("no length", lambda t: put(t, "links.femur.length", 0.0), ["femur.length", "without extent"]),
     (
-        "restitution 0",
-        lambda t: put(t, "contact.restitution", 0.0),
-        ["contact.restitution", "> 0", "hertz"],
-    ),
-    (
         "friction order",
         lambda t: put(t, "friction.mu_static", 0.1),
         ["friction.mu_static", "at least mu = 0.7"],
@@ -201,7 +196,6 @@ BAD: list[tuple[str, Callable[[Table], None], list[str]]] = [
         lambda t: put(t, "servo.torque_continuous", 7.0),
         ["servo.torque_continuous", "torque_max = 6"],
     ),
-    ("rk4 without step", lambda t: put(t, "solver.method", "rk4"), ["solver.step", "fixed step"]),
 ]
 
 

@@ -189,27 +189,3 @@ def test_a_slope_steeper_than_friction_holds_lets_the_robot_slide_as_one_body(
         robot, body, Command(angle_ref=robot.stance), standing_damping(robot, body), pose.bristle
     )
     assert float(np.max(np.abs(result.dv - np.concatenate([pose.slide, np.zeros(3)])))) < AT_REST
-
-
-@pytest.mark.parametrize(("incline", "slides"), [(0.5, False), (0.6, True)])
-def test_bristles_hold_the_robot_up_to_their_static_friction_and_let_it_slide_with_kinetic(
-    incline: float, slides: bool
-) -> None:
-    """The coefficients are 0.3 and 0.6; tan 0.5 = 0.546 and tan 0.6 = 0.684. At 0.6 rad the robot
-    slides with 9.81 (sin 0.6 - 0.3 cos 0.6) = 3.1101 m/s2.
-    """
-    robot = with_friction(
-        robot_on("athena", kind="slope", incline=incline, law="bristle"), mu=0.3, mu_static=0.6
-    )
-    pose = standing(robot)
-    assert float(np.linalg.norm(pose.slide)) == pytest.approx(3.1101 if slides else 0.0, abs=1e-4)
-    if not slides:
-        body = bodies(robot, pose)
-        result = accelerations(
-            robot,
-            body,
-            Command(angle_ref=robot.stance),
-            standing_damping(robot, body),
-            pose.bristle,
-        )
-        assert float(np.max(np.abs(result.dv))) < AT_REST

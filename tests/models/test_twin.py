@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexapod_cosim.models import BodyContact, Robot, load_robot
-from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force
+from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.dynamics import (
     Command,
     accelerations,
@@ -17,20 +17,14 @@ from hexapod_cosim.models.dynamics import (
     constraints,
     drive_acceleration,
     joint_reactions,
-    mass_matrix,
     masses,
     world_inertias,
 )
 from hexapod_cosim.models.energy import (
-    centre_of_mass,
     constraint_errors,
-    kinetic_energy,
-    momentum,
-    potential_energy,
 )
 from hexapod_cosim.models.ground.faces import ground
 from hexapod_cosim.models.kinematics import (
-    axis_normals,
     axis_quaternion,
     body_states,
     cross,
@@ -38,7 +32,6 @@ from hexapod_cosim.models.kinematics import (
     joint_models,
     joint_speeds,
     quaternion_product,
-    quaternion_rate,
     rotation_matrix,
 )
 from hexapod_cosim.models.records import Array
@@ -104,31 +97,6 @@ def close(a: Any, b: Any, tolerance: float) -> bool:
 
 
 # kinematics
-
-
-def test_quaternion_rate_turns_the_rotation_matrix() -> None:
-    rng = np.random.default_rng(1)
-    p, w = rng.normal(size=4), rng.normal(size=3)
-    p /= np.linalg.norm(p)
-    rate = (
-        rotation_matrix(p + DIFFERENCE * quaternion_rate(p, w))
-        - rotation_matrix(p - DIFFERENCE * quaternion_rate(p, w))
-    ) / (2.0 * DIFFERENCE)
-    assert close(
-        rate, np.array([cross(w, column) for column in rotation_matrix(p).T]).T, DIFFERENCES_AGREE
-    )
-
-
-@pytest.mark.parametrize(
-    "axis", [(0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.6, 0.0, 0.8), (0.48, 0.6, 0.64)]
-)
-def test_axis_normals_and_the_axis_are_orthonormal_and_right_handed(
-    axis: tuple[float, float, float],
-) -> None:
-    a, b = axis_normals(np.array(axis))
-    frame = np.column_stack([axis, a, b])
-    assert close(frame.T @ frame, np.eye(3), EXACT)
-    assert np.linalg.det(frame) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -204,81 +172,7 @@ def test_accelerations_satisfy_the_stabilised_constraints_and_every_body_balance
     assert close(inertia, applied, 1e-9)
 
 
-def test_the_mass_matrix_is_symmetric_and_positive_definite() -> None:
-    robot = load_robot("athena")
-    M = mass_matrix(robot, random_bodies(robot, 5))
-    assert close(M, M.T, EXACT)
-    assert np.linalg.eigvalsh(M)[0] > 0.0
-
-
 # laws of motion
-
-
-@pytest.mark.parametrize("mode", ["position", "kinematic"])
-def test_in_free_flight_momentum_changes_by_gravity_alone(mode: str) -> None:
-    robot = with_mode(load_robot("phantomx_mk4"), mode)
-    body = random_bodies(robot, 7, height=2.0)
-    command = Command(angle_ref=robot.stance + 0.1)
-    dv = accelerations(robot, body, command, NO_CONTACT).dv
-    (before, spin_before), (after, spin_after) = (
-        momentum(robot, advanced(body, dv, h)) for h in (-DIFFERENCE, DIFFERENCE)
-    )
-    weight = robot.total_mass * np.array(robot.gravity)
-    assert close((after - before) / (2.0 * DIFFERENCE), weight, DIFFERENCES_AGREE)
-    assert close(
-        (spin_after - spin_before) / (2.0 * DIFFERENCE),
-        cross(centre_of_mass(robot, body), weight),
-        DIFFERENCES_AGREE,
-    )
-
-
-@pytest.mark.parametrize("mode", ["position", "kinematic"])
-def test_power_in_less_power_lost_is_the_rate_of_stored_energy(mode: str) -> None:
-    robot = replace(with_mode(load_robot("athena"), mode), body=BodyContact())
-    body, command, damping = random_bodies(robot, 8), random_command(robot, 8), np.full(6, 3.0)
-    result = accelerations(robot, body, command, damping)
-    stored = [
-        sum(
-            energy(robot, advanced(body, result.dv, h))
-            for energy in (kinetic_energy, potential_energy)
-        )
-        for h in (-DIFFERENCE, DIFFERENCE)
-    ]
-    speed = joint_speeds(robot, body)
-    power = float(np.sum((result.drive_torque + result.gear_torque) * speed))
-    power += float(command.push_force @ body[0, 7:10] + command.push_torque @ body[0, 10:13])
-    for foot, d in zip(foot_contacts(robot, body), damping, strict=True):
-        elastic = robot.contact.stiffness * max(foot.penetration, 0.0) ** 1.5
-        power += float(foot_force(robot, foot, d) @ foot.velocity) + elastic * foot.approach_speed
-    assert (stored[1] - stored[0]) / (2.0 * DIFFERENCE) == pytest.approx(power, rel=1e-5)
-
-
-def test_left_right_mirrored_bodies_have_mirrored_accelerations() -> None:
-    robot = load_robot("athena")
-    rng = np.random.default_rng(9)
-    flip, axial = np.array([1.0, -1.0, 1.0]), np.array([-1.0, 1.0, -1.0])
-    angle, speed = robot.stance + rng.normal(0.0, 0.2, (6, 3)), rng.normal(0.0, 1.0, (6, 3))
-    p, v, w, r = (
-        rng.normal(0.0, 0.05, 4) + np.eye(4)[0],
-        rng.normal(size=3),
-        rng.normal(size=3),
-        np.array([0.0, 0.1, 0.12]),
-    )
-    other, coxa = [3, 4, 5, 0, 1, 2], np.array([-1.0, 1.0, 1.0])
-    damping, command = np.full(6, 3.0), Command(angle_ref=robot.stance)
-    plain = accelerations(robot, body_states(robot, r, p, v, w, angle, speed), command, damping)
-    mirrored_bodies = body_states(
-        robot,
-        r * flip,
-        p * [1.0, -1.0, 1.0, -1.0],
-        v * flip,
-        w * axial,
-        angle[other] * coxa,
-        speed[other] * coxa,
-    )
-    mirrored = accelerations(robot, mirrored_bodies, command, damping)
-    assert close(mirrored.dv[0], plain.dv[0] * np.concatenate([flip, axial]), 1e-10)
-    assert close(mirrored.drive_torque, plain.drive_torque[other] * coxa, 1e-10)
 
 
 # kinematic drives

@@ -9,9 +9,9 @@ import ctypes as ct
 import numpy as np
 import pytest
 from plant import Plant
+from slopes import rates
 from states import changed, lopsided, random_command, random_pose
 from test_laws_impact import above
-from test_plant_stages import coefficients, rates
 
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
@@ -26,6 +26,7 @@ from hexapod_cosim.models.measure import (
     measured_step,
     step_works,
 )
+from hexapod_cosim.models.method import METHOD
 from hexapod_cosim.models.records import Array
 
 H = 2e-4  # s
@@ -58,7 +59,7 @@ def test_a_step_s_measures_are_those_of_the_readable_equations(
 ) -> None:
     robot = changed(
         lopsided(seed),
-        solver={"method": "bs32", "step": H},
+        solver={"method": "dp54", "step": H},
         terrain=terrain,
         servo={"torque_max": 3.0, "speed_max": 8.0},
     )
@@ -66,7 +67,7 @@ def test_a_step_s_measures_are_those_of_the_readable_equations(
     command = random_command(robot, seed)
     plant, there = (Plant(core, robot, **random_pose(robot, seed)) for _ in range(2))
     before, damping = plant.bodies, standing_damping(robot, plant.bodies)
-    m, rate = coefficients(core, "bs32"), rates(core, there, command)
+    m, rate = METHOD["dp54"], rates(core, there, command)
     k, sums = np.zeros((7, 247)), [np.zeros((6, 3)) for _ in range(3)]
     for i in range(m.stages):
         y = before.ravel() + H * m.a[i] @ k
@@ -134,7 +135,7 @@ def test_the_rise_of_a_landing_is_that_of_the_readable_equations(
     """
     settings = {"law": "exact_restitution", "restitution": restitution}
     robot = changed(
-        load_robot("athena"), contact=settings, solver={"method": "bs32", "step": 2.3e-4}
+        load_robot("athena"), contact=settings, solver={"method": "dp54", "step": 2.3e-4}
     )
     plant = Plant(
         core,

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import random
-import re
 from pathlib import Path
 
 import pytest
@@ -49,31 +47,11 @@ CASES: dict[str, tuple[str, str, list[str]]] = {
         f"{ARM}</robot>",
         ["not six legs", "7 moving joints", "that are no legs' fixed"],
     ),
-    "two joints": (
-        'name="j_t1" type="revolute"',
-        'name="j_t1" type="fixed"',
-        ["chain of three joints", "got 'j_c1, j_f1'"],
-    ),
     "no inertial": (FEMUR, "", ["link 'femur_1'", "without mass", "<inertial>"]),
     "no possible body": (
         'ixx="5e-5" iyy="1.8e-4"',
         'ixx="5e-5" iyy="2.8e-4"',
         ["joint j_f1", "no possible body", "sum of"],
-    ),
-    "negative mass": (
-        '<mass value="0.16"/>',
-        '<mass value="-0.16"/>',
-        ["link 'femur_1'", "negative mass", "got -0.16"],
-    ),
-    "not a number": (
-        '<mass value="0.16"/>',
-        '<mass value="0.16 kg"/>',
-        ["link 'femur_1'", "got '0.16 kg'"],
-    ),
-    "two numbers": (
-        '<origin xyz="0.09 0 0"',
-        '<origin xyz="0.09 0"',
-        ["joint 'j_t1'", "got '0.09 0'", "3 finite numbers"],
     ),
     "limits swapped": (
         '<limit lower="-0.8" upper="0.9"',
@@ -90,12 +68,6 @@ CASES: dict[str, tuple[str, str, list[str]]] = {
         'radius="0.02"',
         ["joint 'j_t1'", "another radius", "foot.radius"],
     ),
-    "quaternion": (
-        '<origin xyz="0.09 0 0" rpy',
-        '<origin xyz="0.09 0 0" quat_xyzw="0 0 0 1" rpy',
-        ["joint 'j_t1'", "quaternion", "rpy"],
-    ),
-    "no parent": ('<parent link="coxa_1"/> ', "", ["joint 'j_f1'", "without parent"]),
     "no such link": (
         '<parent link="coxa_1"/>',
         '<parent link="coxa1"/>',
@@ -108,8 +80,6 @@ CASES: dict[str, tuple[str, str, list[str]]] = {
         '<joint name="ba" type="fixed"><parent link="b"/><child link="a"/></joint></robot>',
         ["ring", "'a'"],
     ),
-    "twin links": ('<link name="femur_1">', '<link name="coxa_1">', ["link twice", "coxa_1"]),
-    "nameless": ('<link name="femur_1">', "<link>", ["without a name"]),
     "all to one side": (
         'xyz="0.0 -0.11 0.01"',
         'xyz="0.0 0.31 0.01"',
@@ -124,17 +94,6 @@ CASES: dict[str, tuple[str, str, list[str]]] = {
         '<gazebo reference="body"/>',
         '<xacro:leg xmlns:xacro="http://ros.org/wiki/xacro"/>',
         ["xacro", "xacro my.urdf.xacro"],
-    ),
-    "another format": ("<robot", "<mujoco", ["not XML"]),
-    "own element, unknown": (
-        "</robot>",
-        '<hexapod><feet radius="1"/></hexapod></robot>',
-        ["hexapod", "'feet'", "did you mean 'foot'"],
-    ),
-    "own element, range": (
-        "</robot>",
-        '<hexapod><foot radius="-1"/></hexapod></robot>',
-        ["foot.radius", "got -1.0"],
     ),
 }
 
@@ -254,43 +213,3 @@ def test_limits_beyond_half_a_turn_are_those_of_half_a_turn(tmp_path: Path) -> N
         math.pi,
     )
     assert "3 limits beyond half a turn" in robot.source["URDF, ignored"]
-
-
-ODD = (
-    "0",
-    "-1",
-    "1e300",
-    "nan",
-    "inf",
-    "",
-    "1e-300",
-    "0 0 0",
-    "1 2",
-    "1e200 1e200 1e200",
-    "body",
-    "femur_1",
-    "fixed",
-    "floating",
-    "é",
-    "&lt;",
-)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_damaged_urdfs_are_read_or_refused_and_never_crash(tmp_path: Path, seed: int) -> None:
-    rng, path = random.Random(seed), tmp_path / "spider.urdf"
-    refused = 0
-    for _ in range(40):
-        text = spider_urdf()
-        for _ in range(rng.choice((1, 2, 3))):
-            places = [match.span(1) for match in re.finditer(r'="([^"]*)"', text)] + [
-                match.span() for match in re.finditer(r"<[^<>]*/>", text)
-            ]
-            begin, end = rng.choice(places)
-            text = text[:begin] + (rng.choice(ODD) if text[begin] != "<" else "") + text[end:]
-        path.write_text(text, encoding="utf-8")
-        try:
-            load_robot(path)
-        except RobotError as error:
-            refused += str(path) in str(error)
-    assert refused > 20

@@ -9,14 +9,11 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
-import mujoco
-import numpy as np
 import pytest
 from disguised_urdf import differences, disguised, random_robot, stances
 from foreign_urdf import SIDE, spider, spider_urdf
 
 from hexapod_cosim.models import BodyContact, RobotError, check_robot, list_robots, load_robot
-from hexapod_cosim.models.mjcf import robot_to_mjcf
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
@@ -151,16 +148,6 @@ def add(link: ET.Element, kind: str, place: str, **size: str) -> None:
     shape = ET.SubElement(link, "collision")
     ET.SubElement(shape, "origin", xyz=place)
     ET.SubElement(ET.SubElement(shape, "geometry"), kind, size)
-
-
-def test_an_upturned_robot_rests_on_its_torso_in_mujoco_too() -> None:
-    model = mujoco.MjModel.from_xml_string(robot_to_mjcf(load_robot("athena")))
-    data = mujoco.MjData(model)
-    angles = np.tile([0.0, -0.3, 0.2], 6)
-    data.qpos = [0.0, 0.0, 0.06, 0.0, 1.0, 0.0, 0.0, *angles]
-    data.ctrl = angles
-    mujoco.mj_step(model, data, 2000)
-    assert data.qpos[2] == pytest.approx(0.04, abs=1e-3)
 
 
 @pytest.mark.parametrize(

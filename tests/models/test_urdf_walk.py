@@ -51,28 +51,6 @@ def walked(call: Call, robot: Path, folder: Path, duration: float) -> Recording:
     return read_recording(folder, RESULTS)
 
 
-def test_a_urdf_robot_walks_as_the_same_robot_in_a_file_of_ours(call: Call, files: Path) -> None:
-    ours, theirs = (
-        walked(call, files / f"{name}.toml", files / name, 2.0) for name in ("ours", "side")
-    )
-    for axis in (1, 2, 3):
-        name = f"torso.position[{axis}]"
-        assert theirs.column(name) == pytest.approx(ours.column(name), abs=SAME_WALK)
-    assert ours.column("torso.position[1]")[-1] > SAME_COURSE
-
-
-def test_a_urdf_robot_of_any_size_is_given_a_gait_of_one_froude_number(tmp_path: Path) -> None:
-    """With the hips 0.12 m above the feet the gait has 1 s, 0.08 m and 0.04 m.
-
-    Strides and step heights are proportional to the height, the period to its square root.
-    """
-    (tmp_path / "spider.urdf").write_text(spider_urdf(), encoding="utf-8")
-    gait = load_robot(tmp_path / "spider.urdf").gait
-    assert gait.stride != pytest.approx(0.08, rel=0.05)
-    assert gait.stride / gait.period**2 == pytest.approx(0.08)  # m/s2
-    assert gait.step_height == pytest.approx(0.5 * gait.stride)
-
-
 def test_a_bare_urdf_stands_in_any_tool_and_walks(call: Call, files: Path) -> None:
     path = files / "spider.fmu"
     code, out, err = call("export", "--robot", files / "spider.urdf", "-o", path)
@@ -100,17 +78,6 @@ def test_the_fmu_of_a_robot_and_of_its_urdf_are_the_same(
         assert code == 0
         hashes.append(json.loads(out)["hash"])
     assert hashes[0] == hashes[1] == load_robot(name).hash
-
-
-@pytest.mark.usefixtures("undrawn")
-def test_a_scenario_finds_the_urdf_beside_it(call: Call, files: Path) -> None:
-    (files / "walk.toml").write_text(
-        'robot = "spider.urdf"\nduration = 0.05\n[outputs]\nplots = false\n', encoding="utf-8"
-    )
-    code, _, err = call("simulate", files / "walk.toml", "-o", files / "out")
-    assert code == 0
-    assert err.startswith("warning: kinematic: too short for metrics: got 0.05 s")
-    assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize("form", [("--urdf", "urdf", "<robot"), ("--mjcf", "xml", "<mujoco")])

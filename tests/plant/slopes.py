@@ -5,9 +5,12 @@ They enter the matrix W = M - z G_v - z^2 G_x of an implicit stage.
 
 from __future__ import annotations
 
+import ctypes as ct
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from plant import Plant, inputs, pointer
 
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.contact.geometry import (
@@ -141,3 +144,21 @@ def assembled(robot: Robot, body: Array, law: LawSlopes) -> tuple[Array, Array]:
 def slopes(robot: Robot, command: Command, body: Array) -> tuple[Array, Array]:
     """Returns the matrices G_x and G_v (114, 114) of contacts and servos for these bodies."""
     return assembled(robot, body, law_slopes(robot, command, body))
+
+
+def rates(core: ct.CDLL, plant: Plant, command: Command) -> Callable[[Array], Array]:
+    """Returns dy/dt of the bodies (247,), which the plant computes from them."""
+
+    def rate(y: Array) -> Array:
+        plant.bodies = y.reshape(19, 13)
+        result, power = np.zeros((19, 13)), np.zeros(3)
+        core.hx_probe_rate(
+            ct.c_void_p(plant.handle),
+            ct.byref(inputs(command)),
+            ct.c_double(0.0),
+            pointer(result),
+            pointer(power),
+        )
+        return result.ravel()
+
+    return rate

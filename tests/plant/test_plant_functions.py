@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import ctypes as ct
-import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,17 +11,13 @@ from states import changed, distance, lopsided, random_bodies
 
 from hexapod_cosim.models import CONTACT_LAWS, Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
-from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force
 from hexapod_cosim.models.contact.law import contact_damping, exact_restitution_chi, normal_force
 from hexapod_cosim.models.dynamics import joint_kinematics, world_inertias
-from hexapod_cosim.models.friction import bristle_rate, friction_force
-from hexapod_cosim.models.ground.faces import ground
 from hexapod_cosim.models.kinematics import (
     body_states,
     joint_angle,
     joint_models,
     joint_speed,
-    quaternion_rate,
     rotation_matrix,
     skew,
 )
@@ -32,16 +26,8 @@ from hexapod_cosim.models.servos.motor import Power
 
 # relative: the same formula with its operations in another order, some hundred roundings
 SAME = 1e-13
-CONTACT_SAME = (
-    # relative, of forces: a penetration of 1e-5 m is the difference of coordinates of about 0.1 m
-    1e-10
-)
 DRIFT = 0.02
 LEG_JOINTS = [(leg, joint) for leg in range(6) for joint in range(3)]
-TERRAINS: dict[str, dict[str, Any]] = {
-    "flat": {"kind": "flat", "height": 0.013, "incline": 0.4, "heading": 1.0},
-    "slope": {"kind": "slope", "height": -0.02, "incline": 0.3, "heading": 2.1},
-}
 
 
 def drifted(core: ct.CDLL, robot: Robot, seed: int) -> tuple[Plant, Array]:
@@ -52,19 +38,6 @@ def drifted(core: ct.CDLL, robot: Robot, seed: int) -> tuple[Plant, Array]:
 
 
 # rotations and frames
-
-
-def test_rotation_and_quaternion_functions_are_the_twins(core: ct.CDLL) -> None:
-    rng = np.random.default_rng(1)
-    for p, w in zip(rng.normal(size=(50, 4)), rng.normal(size=(50, 3)), strict=True):
-        assert (
-            distance(probed(core.hx_probe_rotation_matrix, p, size=9), rotation_matrix(p).ravel())
-            < SAME
-        )
-        assert (
-            distance(probed(core.hx_probe_quaternion_rate, p, w, size=4), quaternion_rate(p, w))
-            < SAME
-        )
 
 
 def test_inertias_are_taken_to_another_point_by_the_congruence(core: ct.CDLL) -> None:
@@ -148,48 +121,6 @@ def test_bodies_come_back_as_they_were_set(core: ct.CDLL) -> None:
 # ground and feet, eq. 14-15
 
 
-@pytest.mark.parametrize("terrain", TERRAINS.values(), ids=TERRAINS)
-def test_the_ground_is_the_twins(core: ct.CDLL, terrain: dict[str, Any]) -> None:
-    robot = changed(load_robot("athena"), terrain=terrain)
-    plant = Plant(core, robot)
-    for point in np.random.default_rng(6).normal(size=(20, 3)):
-        height, normal = ground(robot.terrain, point)
-        assert (
-            distance(probed(core.hx_probe_ground, plant, point, size=4), [height, *normal]) < SAME
-        )
-
-
-@pytest.mark.parametrize("terrain", TERRAINS.values(), ids=TERRAINS)
-@pytest.mark.parametrize("law", CONTACT_LAWS)
-@pytest.mark.parametrize("friction", ["tanh", "none", "bristle"])
-def test_foot_kinematics_and_forces_are_the_twins(
-    core: ct.CDLL, terrain: dict[str, Any], law: str, friction: str
-) -> None:
-    robot = changed(
-        lopsided(7),
-        terrain=terrain,
-        contact={"law": law, "impact_speed_floor": 2.0, "damping_factor": 0.5},
-        friction={"law": friction},
-    )
-    plant, body = drifted(core, robot, 7)
-    damping, touching = contact_damping(robot.contact, 0.0), 0
-    output = plant.output()
-    for leg, foot in enumerate(foot_contacts(robot, body)):
-        got = probed(core.hx_probe_foot, plant, inputs(plant.hold()), leg, 0.0, size=17)
-        seen = np.concatenate(
-            [foot.point, foot.velocity, foot.normal, [foot.penetration, foot.approach_speed]]
-        )
-        force = foot_force(robot, foot, damping if foot.penetration > 0.0 else math.nan)
-        assert distance(got[:11], seen) < SAME
-        assert distance(got[11:14], force) < CONTACT_SAME
-        assert np.array_equal(output.foot.force[leg], got[11:14])
-        touching += foot.penetration > 0.0
-    assert touching == np.count_nonzero(output.foot.normal_force) == 3
-    assert list(output.foot.contact) == [
-        foot.penetration > 0.0 for foot in foot_contacts(robot, body)
-    ]
-
-
 @pytest.mark.parametrize("law", CONTACT_LAWS)
 def test_the_normal_force_is_the_twins_and_its_slopes_are_its_derivatives(
     core: ct.CDLL, law: str
@@ -231,76 +162,6 @@ def normal_probe(
     core: ct.CDLL, plant: Plant, damping: float, delta: float, ddelta: float, *, closed: float = 1.0
 ) -> Array:
     return probed(core.hx_probe_normal_force, plant, closed, damping, delta, ddelta, size=4)
-
-
-def test_friction_is_the_twins_through_its_limit_at_rest(core: ct.CDLL) -> None:
-    robot = changed(load_robot("athena"), friction={"slope": 60.0})
-    plant = Plant(core, robot)
-    for speed in (0.0, 1e-12, 0.99e-5 / 60.0, 1.01e-5 / 60.0, 1e-3, 0.05, 3.0):
-        per_speed = asked(core.hx_probe_friction, plant, speed)
-        slip = np.array([0.6, -0.8, 0.0]) * speed
-        assert (
-            distance(
-                -robot.friction.mu * 10.0 * per_speed * slip,
-                friction_force(robot.friction, 10.0, slip),
-            )
-            < SAME
-        )
-        assert per_speed == pytest.approx(
-            math.tanh(60.0 * speed) / speed if speed else 60.0, rel=SAME
-        )
-
-
-@pytest.mark.parametrize(
-    "static", [{}, {"mu_static": 1.1, "stribeck_speed": 0.3}], ids=["one coefficient", "static"]
-)
-@pytest.mark.parametrize("terrain", TERRAINS.values(), ids=TERRAINS)
-def test_bristles_and_their_force_are_the_twins(
-    core: ct.CDLL, terrain: dict[str, Any], static: dict[str, float]
-) -> None:
-    """Covers slack, stretched, sliding and overstretched bristles, along the slip and against it.
-    The bristles of an open foot do not move.
-    """
-    robot = changed(
-        lopsided(7),
-        terrain=terrain,
-        contact={"impact_speed_floor": 2.0},
-        friction={"law": "bristle", "bristle_damping": 1e-3} | static,
-    )
-    plant, body = drifted(core, robot, 7)
-    damping, rng, seen = contact_damping(robot.contact, 0.0), np.random.default_rng(10), set()
-    for size in (0.0, 0.3, 0.8, 0.8, 0.99, 0.99, 1.0, 1.2, 1.2):
-        feet = foot_contacts(robot, body)
-        z = np.cross(
-            rng.normal(size=(6, 3)), feet[0].normal
-        )  # the bristle force along the ground, with its size
-        z *= size * robot.friction.presliding / np.linalg.norm(z, axis=1, keepdims=True)
-        rate = probed(core.hx_probe_bristles, plant, inputs(plant.hold()), z, size=18).reshape(6, 3)
-        output = plant.output()
-        for leg, foot in enumerate(feet):
-            slip = foot.velocity + foot.approach_speed * foot.normal
-            closed = foot.penetration > 0.0
-            assert (
-                distance(
-                    rate[leg], bristle_rate(robot.friction, slip, z[leg]) if closed else np.zeros(3)
-                )
-                < SAME
-            )
-            assert (
-                distance(
-                    output.foot.force[leg],
-                    foot_force(robot, foot, damping if closed else math.nan, z[leg]),
-                )
-                < CONTACT_SAME
-            )
-            seen.add((size, closed, bool(slip @ z[leg] > 0.0)))
-        assert np.array_equal(output.foot.bristle, z)
-    assert {
-        (0.99, True, True),
-        (0.99, True, False),
-        (1.2, True, True),
-        (0.8, False, True),
-    } <= seen  # deflection over the presliding, contact closed, foot slips on
 
 
 @pytest.mark.parametrize("e", [1e-3, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.9999, 1.0])

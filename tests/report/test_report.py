@@ -315,6 +315,15 @@ def test_a_damaged_folder_is_reported_in_a_paragraph_and_left_as_it_is(
     assert sorted(path.name for path in folder.iterdir()) == before
 
 
+def test_a_folder_of_an_extension_that_is_not_installed_is_named(
+    call: Call, tmp_path: Path
+) -> None:
+    write_json(tmp_path / "run.json", {"kind": "dance", "status": "completed"})
+    code, _, err = call("report", tmp_path)
+    assert code == 1
+    assert "install the extension with the command dance" in " ".join(err.split())
+
+
 def test_a_report_is_made_again_from_gains_that_json_cannot_hold(
     call: Call, tmp_path: Path
 ) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import base64
 import json
 import zlib
-from io import BytesIO
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,19 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.backend_bases import RendererBase
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from hexapod_cosim.controller.figure_style import SETTINGS
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.report import plots
 from hexapod_cosim.cosim.report.columns import MOST_ROWS, choose
-from hexapod_cosim.cosim.report.figures import Figures, draw_figures, write_figures
+from hexapod_cosim.cosim.report.figures import (
+    Figures,
+    draw_figures,
+    place_axes,
+    write_figures,
+)
 from hexapod_cosim.cosim.report.packing import pack
 from hexapod_cosim.cosim.report.payload import as_json
 from hexapod_cosim.cosim.results.window import View
@@ -118,28 +124,24 @@ def test_json_cannot_end_the_script_it_stands_in() -> None:
 # Tests figures in memory: drawing and writing.
 
 
-def labelled(_views: plots.Views) -> Figure:
-    """Two plots whose labels need room that only a layout gives them."""
-    figure = Figure(figsize=(3.0, 2.0))
-    for axes in figure.subplots(1, 2, sharey=True):
-        axes.plot([0.0, 1e4], [0.0, 1e-3])
-        axes.set(xlabel="long way\nin two lines", ylabel="height\n[m]", title="title")
-    figure.supxlabel("both")
-    return figure
-
-
-def test_files_have_the_bytes_of_figures_that_are_laid_out_by_saving_them(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(plots, "DRAWINGS", {"one": labelled})
-    drawn = draw_figures({}, ("png", "svg")).images
-    with matplotlib.rc_context(SETTINGS):
-        figure = labelled({})
-        for kind, metadata in (("png", {}), ("svg", {"Date": None})):
-            content = BytesIO()
-            figure.savefig(content, format=kind, dpi=200, metadata=metadata)
-            assert drawn[f"one.{kind}"] == content.getvalue()
-            figure.set_layout_engine("none")
+def test_axes_leave_room_for_their_labels_and_for_the_legend() -> None:
+    with matplotlib.rc_context(SETTINGS | {"figure.constrained_layout.use": False}):
+        figure = Figure(figsize=(7.2, 3.8))
+        for axes in figure.subplots(2, 3).flat:
+            axes.set(ylabel="height [m]", title="title")
+            axes.plot([0.0, 9.0], [0.0, 1.0])
+        axes.set_xlabel("time [s]")
+        legend = figure.legend(axes.lines, ["a curve"], loc="outside upper center")
+        place_axes(figure)
+        renderer = FigureCanvasAgg(figure).get_renderer()
+        boxes = [axes.get_tightbbox(renderer) for axes in figure.axes]
+        boxes.append(legend.get_window_extent(renderer))
+    edges = np.array([box.extents for box in boxes if box is not None])  # px    x0, y0, x1, y1
+    assert len(edges) == 7
+    assert (edges[:, :2] >= 0.0).all()
+    for one, other in combinations(edges, 2):
+        apart = np.maximum(one[:2] - other[2:], other[:2] - one[2:])
+        assert apart.max() > 0.0, (one, other)
 
 
 def test_a_figure_is_drawn_once_for_each_file(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -63,7 +63,7 @@ def made(value: float, other: float = 0.0, *, seed: int = 0, upright: bool = Tru
     [
         ((), "settings", "tolerance", 1e-6),
         (("solver.tolerance=0.03",), "settings", "tolerance", 3e-4),
-        (("solver.method=rk4", "solver.step=0.001"), "settings", "step", 1e-4),
+        (("solver.method=dp54", "solver.step=0.001"), "settings", "step", 1e-4),
         (("parameters={'solver.tolerance' = 0.1}",), "parameters", "solver.tolerance", 1e-3),
     ],
 )

@@ -130,7 +130,7 @@ def test_a_saved_state_continues_bit_for_bit_with_its_locks_and_a_failed_step_ke
     assert plant.save() == other.save()
 
 
-def test_events_set_strength_and_lock_for_their_time() -> None:
+def test_events_set_weakness_and_lock_for_their_time() -> None:
     events = (
         "{time=0.01, leg='LM', joint='tibia', fault='weak', share=0.2, duration=0.01}, "
         "{time=0.02, leg='RR', joint='all', fault='limp'}, "
@@ -139,8 +139,8 @@ def test_events_set_strength_and_lock_for_their_time() -> None:
     scenario = load_scenario("walk_flat", overrides=["duration=0.05", f"events=[{events}]"])
     servos = make_schedule(scenario).servos
     assert servos is not None
-    strength, lock = np.moveaxis(servos.reshape(10, 2, 6, 3), 1, 0)
-    assert strength[:, 1, 2].tolist() == [1, 1, 0.2, 0.2, *6 * [1]]
-    assert strength[:, 5].T.tolist() == [[1] * 4 + [0, 0, 1, 1, 0, 0], *2 * [[1] * 4 + [0] * 6]]
+    weakness, lock = np.moveaxis(servos.reshape(10, 2, 6, 3), 1, 0)
+    assert weakness[:, 1, 2].tolist() == [0, 0, 0.8, 0.8, *6 * [0]]
+    assert weakness[:, 5].T.tolist() == [[0] * 4 + [1, 1, 0, 0, 1, 1], *2 * [[0] * 4 + [1] * 6]]
     assert lock[:, 5, 0].tolist() == [*6 * [0], 1, 1, 0, 0]
     assert np.count_nonzero(lock) == 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import closing
+from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,8 @@ from hexapod_cosim.extensions.study.folder import RESULTS
 from hexapod_cosim.extensions.study.job import Job, make_job
 from hexapod_cosim.extensions.study.reading import study_from_table
 from hexapod_cosim.extensions.study.records import Study
+from hexapod_cosim.extensions.study.run import Options, run_study
 from hexapod_cosim.extensions.study.store import RUNS, Store, quoted
-from hexapod_cosim.extensions.study.study import Options, run_study
 
 SMALL: dict[str, Any] = {
     "scenario": "walk_flat",
@@ -31,15 +31,20 @@ def study_of(table: Mapping[str, Any] = SMALL, **changes: Any) -> Study:
     return study_from_table({**table, **changes}, where="test.toml")
 
 
-def quiet(_total: int, _done: int) -> Any:
-    """Starts no display of progress."""
-    return lambda _more, _lost: None
+def quiet(_total: int) -> Any:
+    """Opens no display of progress."""
+    return nullcontext(lambda _done, _failed: None)
+
+
+def watched(act: Callable[[], object]) -> Any:
+    """Returns a display of progress that calls `act` for each number of new results."""
+    return lambda _total: nullcontext(lambda done, _failed: done and act())
 
 
 def run_quietly(study: Study, folder: Path, **options: Any) -> list[Row]:
     """Runs a study without a display of progress; returns the rows of its results."""
     run_study(
-        study, folder, options=Options(**{"runner": Fake, "workers": 0, **options}), start=quiet
+        study, folder, options=Options(**{"runner": Fake, "workers": 0, **options}), progress=quiet
     )
     return rows(folder)
 
@@ -88,4 +93,4 @@ def use_runner(monkeypatch: pytest.MonkeyPatch, runner: type) -> None:
     def make(*arguments: Any, **options: Any) -> Job:
         return make_job(*arguments, **{**options, "runner": runner})
 
-    monkeypatch.setattr("hexapod_cosim.extensions.study.study.make_job", make)
+    monkeypatch.setattr("hexapod_cosim.extensions.study.run.make_job", make)

@@ -49,14 +49,11 @@ class Fake(UNTYPED):  # type: ignore[misc]
 
     pause = 0.0  # s
 
-    def __init__(self, *, controller: Path) -> None:
-        assert controller.is_file()
+    def __init__(self, *, fmu: Path | None) -> None:
+        assert fmu is None or fmu.is_file()
 
-    def summary(
-        self, scenario: Scenario, *, fmu: Path, gains: Gains | None, progress: Progress
-    ) -> Summary:
+    def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
         """Implements Runner.summary()."""
-        assert fmu.is_file()
         mu, control, seed = scenario.settings["friction"]["mu"], scenario.control, scenario.seed
         if mu == DEADLY:
             die(f"{control} {seed}")
@@ -122,15 +119,7 @@ ERRORS: dict[float, Callable[[], object]] = {
     0.23: lambda: _raise(MemoryError("no more")),
     0.24: lambda: _raise(SourError(f"nobody can send {object()}")),
     0.25: lambda: sys.exit("enough"),
-    0.26: lambda: _raise(BadTextError()),
 }
-
-
-class BadTextError(Exception):
-    """An exception without a text."""
-
-    def __str__(self) -> str:
-        raise RuntimeError
 
 
 def _raise(error: Exception) -> None:

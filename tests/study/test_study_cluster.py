@@ -6,18 +6,17 @@ import signal
 import subprocess
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import pytest
 from command import COMMAND
 from dask_cluster import TIMEOUT, dask_scheduler, kill, mortal_workers, restarting_workers
-from studies import KINEMATIC, Row, quiet, rows, run_quietly, study_of
+from studies import KINEMATIC, Row, quiet, rows, run_quietly, study_of, watched
 from study_runners import Slow
 
 from hexapod_cosim.extensions.study.records import StudyError
-from hexapod_cosim.extensions.study.study import Options, run_study
+from hexapod_cosim.extensions.study.run import Options, run_study
 
 TABLE: dict[str, Any] = {**KINEMATIC, "seeds": 40, "factors": {"friction.mu": [0.3, 0.5]}}
 
@@ -30,25 +29,25 @@ def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 @pytest.fixture
-def study_on(athena_fmu: Path, tmp_path: Path, scheduler: str) -> Callable[..., list[str]]:
+def study_on(athena_fmu: Path, tmp_path: Path, scheduler: str) -> Callable[..., None]:
     """A function that runs the study on the cluster into tmp_path/out.
 
-    It calls its argument once, when the first results are there, and returns the events.
+    It calls its argument once, when the first results are there.
     """
 
-    def run(after_the_first: Callable[[], object], address: str = scheduler) -> list[str]:
-        events: list[str] = []
-        options = Options(runner=Slow, fmu=athena_fmu, scheduler=address, events=events.append)
-        run_study(study_of(TABLE), tmp_path / "out", options=options, start=once(after_the_first))
-        return events
+    def run(after_the_first: Callable[[], object], address: str = scheduler) -> None:
+        options = Options(runner=Slow, fmu=athena_fmu, scheduler=address)
+        run_study(
+            study_of(TABLE), tmp_path / "out", options=options, progress=once(after_the_first)
+        )
 
     return run
 
 
 def once(act: Callable[[], object]) -> Any:
-    """Returns a start function whose progress display calls `act` once."""
+    """Returns a display of progress that calls `act` once, when the first results are there."""
     todo = [act]
-    return lambda _total, _done: lambda _more, _lost: todo and todo.pop()()
+    return watched(lambda: todo and todo.pop()())
 
 
 @pytest.fixture(scope="module")
@@ -63,19 +62,6 @@ def test_a_killed_worker_costs_no_run(
 ) -> None:
     with mortal_workers(scheduler, 2, tmp_path) as workers:
         study_on(lambda: kill(workers[0]))
-    assert rows(tmp_path / "out") == alone
-
-
-def test_workers_that_join_when_all_are_gone_get_the_job_and_continue(
-    study_on: Callable[..., Any], scheduler: str, alone: list[Row], tmp_path: Path
-) -> None:
-    with ExitStack() as opened, mortal_workers(scheduler, 1, tmp_path) as workers:
-
-        def replace() -> None:
-            kill(workers[0])
-            opened.enter_context(mortal_workers(scheduler, 1, tmp_path))
-
-        study_on(replace)
     assert rows(tmp_path / "out") == alone
 
 
@@ -118,7 +104,7 @@ def test_studies_that_share_a_cluster_do_not_disturb_each_other(
 
     def run(k: int) -> None:
         options = Options(runner=Slow, fmu=athena_fmu, scheduler=scheduler)
-        run_study(study_of(tables[k]), tmp_path / f"out{k}", options=options, start=quiet)
+        run_study(study_of(tables[k]), tmp_path / f"out{k}", options=options, progress=quiet)
 
     with mortal_workers(scheduler, 2, tmp_path), ThreadPoolExecutor(len(tables)) as together:
         list(together.map(run, range(len(tables))))

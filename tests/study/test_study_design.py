@@ -12,6 +12,7 @@ from scipy import stats
 from studies import study_of
 
 from hexapod_cosim.extensions.study.factors import at_quantile
+from hexapod_cosim.extensions.study.orders import count_points, count_runs, points_of, sweep_orders
 from hexapod_cosim.extensions.study.records import (
     INTEGERS,
     LOGUNIFORM,
@@ -21,7 +22,6 @@ from hexapod_cosim.extensions.study.records import (
     Factor,
     Study,
 )
-from hexapod_cosim.extensions.study.runs import Design, Sweep
 
 TWO = {"friction.mu": {"uniform": [0.0, 1.0]}, "command.vx": {"uniform": [0.0, 1.0]}}
 STRATA = 64
@@ -34,8 +34,11 @@ def drawn(
 
 
 def table(study: Study) -> np.ndarray[Any, Any]:
-    design = Design(study)
-    return np.array([design.point(index) for index in range(design.count)], dtype=np.float64)
+    return np.array(points(study), dtype=np.float64)
+
+
+def points(study: Study) -> list[tuple[Any, ...]]:
+    return list(map(points_of(study), range(count_points(study))))
 
 
 def test_a_grid_is_the_product_of_its_factors_the_last_fastest() -> None:
@@ -44,16 +47,16 @@ def test_a_grid_is_the_product_of_its_factors_the_last_fastest() -> None:
         "command.vx": {"linspace": [0.0, 0.1, 3]},
         "gait.name": ["tripod", "wave"],
     }
-    design = Design(study_of({"factors": factors}))
+    study = study_of({"factors": factors})
     expected = list(itertools.product([0.3, 0.6], [0.0, 0.05, 0.1], ["tripod", "wave"]))
-    assert [design.point(index) for index in range(design.count)] == expected
+    assert points(study) == expected
 
 
 def test_a_list_takes_the_factors_side_by_side() -> None:
     # in a list values may be repeated
     factors = {"friction.mu": [0.3, 0.6, 0.3], "gait.name": ["tripod", "wave", "wave"]}
-    design = Design(study_of({"design": "list", "factors": factors}))
-    assert [design.point(index) for index in range(design.count)] == [
+    study = study_of({"design": "list", "factors": factors})
+    assert points(study) == [
         (0.3, "tripod"),
         (0.6, "wave"),
         (0.3, "wave"),
@@ -78,9 +81,9 @@ def test_sobol_points_fill_squares_too_and_random_ones_do_not() -> None:
 @pytest.mark.parametrize("design", ["random", "latin_hypercube", "sobol"])
 def test_points_depend_on_the_seed_only_and_not_on_the_order_of_calls(design: str) -> None:
     whole = table(drawn(design))
-    again = Design(drawn(design))
+    again = points_of(drawn(design))
     for index in (40, 3, 3, 63, 0, 41):
-        assert tuple(whole[index]) == again.point(index)
+        assert tuple(whole[index]) == again(index)
     assert not np.array_equal(whole, table(drawn(design, seed=1)))
 
 
@@ -112,16 +115,13 @@ def test_values_and_integers_are_equally_likely_and_the_ends_are_reached() -> No
 
 def test_runs_are_points_then_seeds_then_controls() -> None:
     study = study_of({"factors": {"friction.mu": [0.3, 0.6]}, "seeds": {"first": 7, "count": 2}})
-    sweep = Sweep(study)
-    orders = list(sweep.orders(iter(range(sweep.count))))
+    orders = list(sweep_orders(study, range(count_runs(study))))
     expected = itertools.product([0.3, 0.6], [7, 8], ["kinematic", "compliant"])
     assert [(order.values[0], order.seed, order.control) for order in orders] == list(expected)
     assert [order.run for order in orders] == list(range(8))
-    assert list(sweep.orders(iter([1, 5]))) == [orders[1], orders[5]]
+    assert list(sweep_orders(study, [1, 5])) == [orders[1], orders[5]]
 
 
 def test_scenarios_are_a_factor_too() -> None:
-    sweep = Sweep(
-        study_of({"factors": {"scenario": ["walk_flat", "turn"]}, "controls": ["kinematic"]})
-    )
-    assert [order.case for order in sweep.orders(iter(range(2)))] == ["walk_flat", "turn"]
+    study = study_of({"factors": {"scenario": ["walk_flat", "turn"]}, "controls": ["kinematic"]})
+    assert [order.case for order in sweep_orders(study, range(2))] == ["walk_flat", "turn"]

@@ -15,11 +15,10 @@ from studies import KINEMATIC, replace_stored, run_quietly, study_of
 
 from hexapod_cosim.cosim.results.comparison import made_change
 from hexapod_cosim.extensions.study import figures
-from hexapod_cosim.extensions.study.figures import drawings
-from hexapod_cosim.extensions.study.groups import Figures, Mean, Point
+from hexapod_cosim.extensions.study.figures import drawing_of
+from hexapod_cosim.extensions.study.run import report_on
 from hexapod_cosim.extensions.study.store import FIGURES
-from hexapod_cosim.extensions.study.study import report_on
-from hexapod_cosim.extensions.study.summary import read_results
+from hexapod_cosim.extensions.study.summary import Figures, Mean, Point, read_results
 from hexapod_cosim.models import load_robot
 
 GRID = {"factors": {"friction.mu": [0.3, 0.5], "command.vx": [0.05, 0.08]}}
@@ -67,7 +66,7 @@ def point(
         walked=dict.fromkeys(slips, walked),
         changes={"compliant": changes},
     )
-    return Point(number=number, case="walk_flat", values=values, held_out=False, figures=figures)
+    return Point(number=number, values=values, held_out=False, figures=figures)
 
 
 def shown(figure: Figure, panel: int = 2) -> np.ndarray[Any, Any]:
@@ -85,22 +84,10 @@ def test_a_cell_shows_its_slips_and_is_empty_without_a_walk() -> None:
         point(0, {"friction.mu": 0.3, "command.vx": 0.05}, {"kinematic": 0.4, "compliant": 0.1}),
         point(1, {"friction.mu": 0.3, "command.vx": 0.08}, nothing, walked=0, pairs=0),  # fell
     ]
-    figure = figures.heat_map(points, study.factors[0], study.factors[1], study)
+    figure = figures.heat_map(points, study)
     nan = math.nan
     for place, expected in enumerate((0.4, 0.1, -75.0)):
         np.testing.assert_allclose(shown(figure, place), [[expected, nan], [nan, nan]])
-
-
-def test_the_change_of_a_cell_is_that_of_its_pairs() -> None:
-    """One of the two points in a cell has no pair, so its means do not count."""
-    study = study_of({"factors": {**GRID["factors"], "gait.name": ["tripod", "wave"]}})
-    place = {"friction.mu": 0.3, "command.vx": 0.05}
-    points = [
-        point(0, place, {"kinematic": 0.4, "compliant": 0.2}),
-        point(1, place, {"kinematic": 9.0, "compliant": 0.2}, pairs=0),
-    ]
-    figure = figures.heat_map(points, study.factors[0], study.factors[1], study)
-    assert shown(figure)[0, 0] == pytest.approx(-50.0)
 
 
 @pytest.fixture
@@ -112,7 +99,7 @@ def folder(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
     def made(table: Mapping[str, Any], *, lost: int = 0, pictures: bool = False) -> str:
         if not pictures:
-            monkeypatch.setattr("hexapod_cosim.extensions.study.page.drawings", lambda *_, **__: {})
+            monkeypatch.setattr("hexapod_cosim.extensions.study.page.drawing_of", lambda _: None)
         out = tmp_path / "out"
         run_quietly(study_of(table), out, fmu=athena_fmu, gains=make_gains(load_robot("athena")))
         if lost:
@@ -146,10 +133,10 @@ def test_figures_of_all_designs_are_drawn_without_a_warning(
         study_of(table), tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena"))
     )
     results = read_results(tmp_path / "out")
-    found = drawings(results)
-    assert set(found) == {"heat_map" if "command.vx" in table["factors"] else "effects"}
-    for item in found.values():
-        item.draw().draw_without_rendering()
+    found = drawing_of(results)
+    assert found is not None
+    assert found.name == "heat_map" if "command.vx" in table["factors"] else "effects"
+    found.draw().draw_without_rendering()
 
 
 def test_a_page_compares_each_control_with_the_first_one(folder: Any) -> None:
@@ -167,13 +154,6 @@ def test_a_page_of_one_control_has_the_files_name_without_a_title_and_no_pairs(
     page = folder({**KINEMATIC, "seeds": 2, "factors": {"friction.mu": [0.3, 0.19]}})
     assert "<h1>test</h1>" in page
     assert "pair" not in page.partition("<h2>Over all runs</h2>")[2]
-
-
-def test_sobol_points_that_are_no_power_of_two_have_a_note(folder: Any) -> None:
-    page = folder(
-        {"design": "sobol", "points": 3, "factors": {"friction.mu": {"uniform": [0.3, 0.9]}}}
-    )
-    assert "3 Sobol points are no power of two: only 2 or 4" in page
 
 
 def test_a_page_of_an_unfinished_study_says_what_its_figures_are_of(folder: Any) -> None:

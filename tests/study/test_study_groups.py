@@ -13,10 +13,9 @@ import pytest
 from studies import Row, study_of, write_rows
 
 from hexapod_cosim.cosim.results.comparison import Change, change_of, half_width_of
-from hexapod_cosim.extensions.study.groups import Figures, Point, Runs, points_of
 from hexapod_cosim.extensions.study.records import Study
 from hexapod_cosim.extensions.study.store import FIGURES, Store
-from hexapod_cosim.extensions.study.summary import failure_counts
+from hexapod_cosim.extensions.study.summary import Figures, Point, Runs, failure_counts, points_of
 
 ROUNDING = 1e-11  # relative: some dozen sums of numbers of one size
 COUNT, SEEDS = 5, 7
@@ -77,7 +76,7 @@ def summed(tmp_path: Path) -> Summed:
         write_rows(study, tmp_path, rows)
         with closing(Store(tmp_path, study)) as store:
             runs = Runs(study, store)
-            return points_of(runs, store)[0], runs.figures()
+            return points_of(runs, store), runs.figures()
 
     return found
 
@@ -137,7 +136,7 @@ def test_changes_are_of_whole_pairs_whichever_runs_are_missing(
 
 
 def test_a_single_control_has_no_pairs(summed: Summed) -> None:
-    alone = replace(TWO, controls=("compliant",))
+    alone = replace(TWO, laws=TWO.laws[1:])
     points, overall = summed(made_rows(alone, [0]), alone)
     for found in (overall, points[0].figures):
         assert not found.changes

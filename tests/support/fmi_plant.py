@@ -8,7 +8,8 @@ from pathlib import Path
 from types import TracebackType
 
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
-from hexapod_cosim.cosim.interface.plant import Interface, load_interface
+from hexapod_cosim.cosim.interface.plant import load_interface
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.models.robot import load_robot
 
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3

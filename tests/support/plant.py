@@ -195,7 +195,7 @@ def inputs(command: Command, lock: Array | None = None) -> Any:
         "acceleration_ref",
     ):
         put(getattr(i, name), getattr(command, name))
-    put(i.strength, np.broadcast_to(command.power.strength, (LEGS, JOINTS)))
+    put(i.weakness, np.broadcast_to(1.0 - np.asarray(command.power.strength), (LEGS, JOINTS)))
     put(i.lock, np.zeros((LEGS, JOINTS)) if lock is None else lock)
     return i
 
@@ -241,9 +241,7 @@ class Plant:
 
     def step_ramp(self, t_end: float, command: Command, rate: Command) -> None:
         """Steps to t_end [s] under a command that changes at a rate [1/s]."""
-        change = inputs(rate)
-        put(change.strength, np.zeros((LEGS, JOINTS)))
-        self._check(self.core.hx_plant_step_ramp(self.handle, inputs(command), change, t_end))
+        self._check(self.core.hx_plant_step_ramp(self.handle, inputs(command), inputs(rate), t_end))
 
     def step_to_event(self, t_end: float, command: Command, *, stop: bool = True) -> bool:
         """Steps to t_end [s], with `stop` to the next event at most; returns whether there was an

@@ -14,6 +14,7 @@ import nbformat
 from nbclient import NotebookClient
 from sphinx.cmd.build import main as sphinx
 
+from hexapod_cosim.cosim.cli.extension import extensions_in, loaded
 from tools.docs import validation, variables
 from tools.docs.stage import DOCS, ROOT, add_page, pages, write
 
@@ -32,7 +33,6 @@ All public modules, from their docstrings. Start with the [tutorial](../tutorial
    hexapod_cosim.cosim
 ```
 """
-WALK = "walk.html"  # the robot on the front page (docs/index.md)
 HEADERS = (
     "plant_fmu/include/hexapod/generated/plant_settings.h",
     "plant_fmu/include/hexapod/hexapod.h",
@@ -60,10 +60,9 @@ def build(out: Path, *, work: Path, computed: bool = True) -> int:
         run_notebooks(work / "notebooks")
         validation.fill(work)
     out.mkdir(parents=True, exist_ok=True)
-    if (ROOT / "extensions" / "live").is_dir():
-        from hexapod_cosim.extensions.live.static_page import write_static_page  # noqa: PLC0415
-
-        write_static_page(out / WALK)
+    for extension in extensions_in(ROOT):
+        for name, place in extension.site.items():
+            loaded(place)(out / name)
     options = ["-W", "--keep-going", "-q", "-n", "-E", "-j", "auto", "-c", str(DOCS)]
     return int(sphinx([*options, "-d", str(work / ".doctrees"), str(work), str(out)]))
 

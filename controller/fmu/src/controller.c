@@ -10,7 +10,9 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
   model->paper = definition->control == HX_CONTROL_PAPER;
   hx_walk_plan_compile(definition, &model->plan);
   if (model->paper) hx_paper_compile(definition, &model->corrections);
+  model->feels = definition->control != HX_CONTROL_KINEMATIC;
   hx_fade_compile(definition->period, &model->fade);
+  hx_health_compile(definition, &model->health);
 }
 
 /* ----------------------------------------------------------------- change of gait and control */
@@ -18,14 +20,15 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
 void hx_controller_adopt(hxControllerModel model[2], hxControllerState *state) {
   hxControllerModel *next = &model[1 - state->model];
   if (!state->changing || !hx_walk_plan_ended(&state->plan)) return;
-  hx_walk_plan_adopt(&next->plan, &model[state->model].plan, &state->plan);
+  hx_walk_plan_adopt(&next->plan, &model[state->model].plan, state->back - 1, &state->plan);
   state->model = 1 - state->model;
-  state->changing = 0;
+  state->changing = state->back = 0;
 }
 
-void hx_controller_change(hxControllerModel model[2], hxControllerState *state) {
+void hx_controller_change(hxControllerModel model[2], int back, hxControllerState *state) {
   state->changing = 1;
-  hx_walk_plan_end(&state->plan);
+  state->regait = 0;
+  state->back = back;
   hx_controller_adopt(model, state);
 }
 
@@ -37,6 +40,7 @@ void hx_controller_exchange(hxControllerModel *model, const hxFootPathsModel *be
   hx_fade_begin(&model->fade, output, &state->fade);
   if (planner->compliant) hx_compliant_reset(&planner->laws, &state->compliant);
   memset(&state->paper, 0, sizeof state->paper);
+  memset(&state->health, 0, sizeof state->health);
   memset(output->shift, 0, sizeof output->shift);
   memset(output->lift, 0, sizeof output->lift);
   memset(output->fallback, 0, sizeof output->fallback);
@@ -79,15 +83,18 @@ static void correct_paths(const hxControllerModel *model, const hxControllerInpu
                       (const double (*)[3])output->planned,
                       {0.0},
                       {0.0},
-                      plan->paths.clock.swinging,
+                      NULL,
                       input->angle,
                       {{0.0}}};
   hxPlane plane[HX_LEGS], velocity[HX_LEGS];
   double height[HX_LEGS];
+  int swinging[HX_LEGS];
   memset(&level, 0, sizeof level);
   level.level = 1;
   hx_sense(input, &level, step.force);
+  step.swinging = swinging;
   for (int k = 0; k < HX_LEGS; ++k) {
+    swinging[k] = plan->paths.clock.swinging[k] || plan->absence.legs[k];
     hx_walk_plan_foot(&model->plan, plan, k, &plane[k], &height[k], &velocity[k], &step.rise[k]);
     step.height[k] = hx_walk_plan_lift(&model->plan, plan, k);
   }
@@ -137,6 +144,37 @@ static void present_step(const hxControllerModel *model, hxControllerState *stat
   present->rolled = now->feet.rolled;
 }
 
+/* -------------------------------------------------------------------------------- lost legs */
+
+/* Takes legs that are lost out of service, before the present step is planned (C57). */
+static void watch(const hxControllerModel *model, const hxControllerInput *input,
+                  hxControllerState *state) {
+  hxPosture level;
+  double force[HX_LEGS][3];
+  memset(&level, 0, sizeof level);
+  level.level = 1;
+  hx_sense(input, &level, force);
+  hx_health_step(&model->health, model->plan.planner.leg, input->angle,
+                 (const double (*)[3])force, &state->output, &state->health);
+  if (!hx_walk_plan_lose(&model->plan, &state->health, &state->output, &state->plan)) return;
+  state->regait = 1;
+  state->changing = state->back = 0;
+}
+
+/* Folds legs out of service away, and takes back one that works again (C58). */
+static void fold(const hxControllerModel *model, const hxControllerInput *input,
+                 hxControllerState *state) {
+  const int back =
+      hx_absence_fold(&model->plan.absent, model->plan.planner.leg, input->angle, &state->health,
+                      &state->plan.absence, &state->output);
+  memcpy(state->output.absent, state->plan.absence.legs, sizeof state->output.absent);
+  memcpy(state->output.faulty, state->health.faulty, sizeof state->output.faulty);
+  if (back < 0 || state->back) return;
+  state->back = back + 1;
+  state->regait = 1;
+  hx_walk_plan_end(&state->plan);
+}
+
 /* -------------------------------------------------------------------------------------- ticks */
 
 void hx_controller_begin(const hxControllerModel *model, double t, hxControllerState *state) {
@@ -157,6 +195,7 @@ void hx_controller_tick(const hxControllerModel *model, const hxControllerInput 
   const int command_changed = hx_command_ramp_aim(&model->plan.ramp, command, &state->plan.ramp);
   hxPresentStep present;
   /* the first tick commands the stance, whatever the input */
+  if (state->tick > 0 && model->feels) watch(model, input, state);
   if (state->tick > 0)
     hx_walk_plan_advance(&model->plan, command_changed, &state->compliant, &state->plan);
   ++state->tick;
@@ -168,4 +207,5 @@ void hx_controller_tick(const hxControllerModel *model, const hxControllerInput 
                       &state->output);
   }
   if (state->fade.left) hx_fade_step(&model->fade, planner->leg, &state->fade, &state->output);
+  fold(model, input, state);
 }

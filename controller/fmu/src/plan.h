@@ -10,11 +10,13 @@ typedef struct hxWalkPlanModel {
   hxStepPlanner planner;
   hxCommandRampModel ramp;
   hxFootPathsModel paths;
+  hxAbsenceModel absent;
 } hxWalkPlanModel;
 
 typedef struct hxWalkPlan {
   hxCommandRamp ramp;
   hxFootPaths paths;
+  hxAbsence absence;
   int64_t at;   /* the present step, counted from the begin of its section */
   int64_t last; /* the step at which the ramp ends, where a new section begins */
   int cut;      /* the present step is the last of its section: a leg lifts off or touches down */
@@ -30,6 +32,8 @@ static inline void hx_walk_plan_compile(const hxControllerDefinition *definition
   hx_command_ramp_compile(definition->gait.period, definition->period, &model->ramp);
   hx_foot_paths_compile(definition, model->planner.leg, &model->paths);
   if (model->planner.compliant) model->paths.clock.handover = model->planner.laws.support.handover;
+  hx_absence_compile(model->paths.home, model->paths.clock.handover * definition->gait.period,
+                     model->period, &model->absent);
 }
 
 /* Index of a planned step: -1 is the previous one, 0 the present one, 1 the next one. */
@@ -45,11 +49,21 @@ static inline hxTwist look_ahead(const hxWalkPlanModel *model, const hxCompliant
                                  const hxWalkPlan *plan, int64_t ahead, int64_t number,
                                  hxPlannedStep *step) {
   hx_command_ramp_ahead(&model->ramp, &plan->ramp, ahead, step->value, step->rate);
+  const hxPlane drift = hx_absence_drift(&model->absent, &plan->absence, ahead);
+  step->value[0] += drift.x;
+  step->value[1] += drift.y;
   hx_posture_of(&step->posture, step->value + 3, step->rate + 3);
   const hxTwist twist = {{step->value[0], step->value[1]}, step->value[2]};
   if (!model->planner.compliant) return twist;
   const hxTwist added = hx_compliant_addition(&model->planner.laws, laws, number);
   return (hxTwist){hx_plane_add(twist.velocity, added.velocity), twist.yaw_rate + added.yaw_rate};
+}
+
+/* Places the legs for planned feet. ahead: periods from the present step. */
+static inline void lay_out(const hxWalkPlanModel *model, const hxCompliant *laws,
+                           const hxWalkPlan *plan, int64_t ahead, hxPlannedStep *step) {
+  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, &model->absent,
+                          &plan->absence, ahead, step);
 }
 
 /* Plans to stand in the stance. */
@@ -58,9 +72,10 @@ static inline void hx_walk_plan_reset(const hxWalkPlanModel *model, const hxComp
   hxPlannedStep *step = hx_walk_plan_step(plan, 0);
   hx_command_ramp_reset(&model->ramp, &plan->ramp);
   plan->cut = 1;
+  hx_absence_reset(&model->absent, &plan->absence);
   hx_foot_paths_reset(&model->paths, &plan->paths, &step->feet);
   look_ahead(model, laws, plan, 0, 0, step);
-  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, step);
+  lay_out(model, laws, plan, 0, step);
 }
 
 /* Plans the step a number of periods after the section began. before: the step before it. */
@@ -69,7 +84,7 @@ static inline void plan_step(const hxWalkPlanModel *model, const hxCompliant *la
                              hxPlannedStep *step) {
   const hxTwist twist = look_ahead(model, laws, plan, 1, number, step);
   hx_foot_paths_walk(&model->paths, &plan->paths, number, twist, &before->feet, &step->feet);
-  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, step);
+  lay_out(model, laws, plan, 1, step);
 }
 
 /* ----------------------------------------------------------------------------------- sections */
@@ -86,14 +101,16 @@ static inline void follow_sensors(const hxWalkPlanModel *model, const hxComplian
   if (hx_command_ramp_moves(&plan->ramp)) paths->narrowing = laws->adaptation.narrowing;
 }
 
-/* Returns whether the gait clock waits for feet at the ends of their swings (C50). */
+/* Returns whether the gait clock waits for feet at the ends of their swings (C50). Without a leg, a
+ * foot may have no load to carry: it need only touch the ground. */
 static inline int waits(const hxWalkPlanModel *model, const hxCompliant *laws,
                         const hxWalkPlan *plan) {
   const hxGaitClock *clock = &plan->paths.clock;
-  int landing[HX_LEGS];
+  int landing[HX_LEGS], held = clock->held;
   if (!model->planner.compliant) return 0;
+  for (int k = 0; k < HX_LEGS; ++k) held &= !clock->absent[k];
   hx_gait_clock_landing(&model->paths.clock, clock, plan->at, landing);
-  return hx_compliance_waits(&model->planner.laws.laws, landing, clock->held, &laws->laws);
+  return hx_compliance_waits(&model->planner.laws.laws, landing, held, &laws->laws);
 }
 
 /* Begins a new section at the present step, and plans the next step. waiting: the gait clock stands
@@ -112,7 +129,7 @@ static inline void plan_afresh(const hxWalkPlanModel *model, int waiting, hxComp
   else
     hx_foot_paths_plan(&model->paths, &now, plan->at, moves || !settled, twist, &plan->paths,
                        &first->feet);
-  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, first);
+  lay_out(model, laws, plan, 0, first);
   plan->last = moves || settled ? INT64_MAX : model->ramp.end - plan->ramp.steps;
   plan->at = 0;
   plan_step(model, laws, plan, 1, first, hx_walk_plan_step(plan, 1));
@@ -131,8 +148,12 @@ static inline void hx_walk_plan_advance(const hxWalkPlanModel *model, int comman
   plan->present = (plan->present + 1) % 3;
   ++plan->at;
   ++plan->ramp.steps;
+  ++plan->absence.since;
   const int64_t next = plan->at + 1;
-  const int reached = hx_gait_clock_reach(&model->paths.clock, &plan->paths.clock, next);
+  int reached = hx_gait_clock_reach(&model->paths.clock, &plan->paths.clock, next);
+  for (int k = 0; k < HX_LEGS; ++k)
+    reached &= !hx_foot_paths_down(&model->paths, &plan->paths, &hx_walk_plan_step(plan, 0)->feet,
+                                   k);
   plan->has_before = 1;
   plan->has_after = reached && next <= plan->last;
   plan->cut = !reached && next <= plan->last;
@@ -152,16 +173,31 @@ static inline void hx_walk_plan_end(hxWalkPlan *plan) {
 static inline int hx_walk_plan_ended(hxWalkPlan *plan) {
   int ended = hx_gait_clock_ended(&plan->paths.clock);
   if (!plan->paths.clock.walking) return 1;
-  for (int k = 0; k < HX_LEGS; ++k) ended &= hx_walk_plan_step(plan, 0)->activation[k] >= 1.0;
+  for (int k = 0; k < HX_LEGS; ++k)
+    ended &= plan->paths.clock.absent[k] || hx_walk_plan_step(plan, 0)->activation[k] >= 1.0;
   return ended;
 }
 
+/* Takes lost legs out of service (C58). last: the last commands. Returns whether any is new. */
+static inline int hx_walk_plan_lose(const hxWalkPlanModel *model, const hxHealth *health,
+                                    const hxControllerOutput *last, hxWalkPlan *plan) {
+  hxGaitClock *clock = &plan->paths.clock;
+  if (!hx_absence_change(&model->absent, health, last, &plan->absence)) return 0;
+  memcpy(clock->absent, plan->absence.legs, sizeof clock->absent);
+  hx_gait_clock_drop(clock);
+  hx_walk_plan_end(plan);
+  return 1;
+}
+
 /* Goes on with the standing feet and the command in another gait (C55). before: the model of the
- * gait so far. */
+ * gait so far; back: a leg that is back in service (C58), -1: none. */
 static HX_SELDOM void hx_walk_plan_adopt(hxWalkPlanModel *model, const hxWalkPlanModel *before,
-                                         hxWalkPlan *plan) {
+                                         int back, hxWalkPlan *plan) {
   hx_command_ramp_carry(&model->ramp, &before->ramp, &plan->ramp);
-  hx_foot_paths_join(&model->paths, &plan->paths, &hx_walk_plan_step(plan, 0)->feet);
+  if (back >= 0) hx_absence_take_back(&model->absent, back, &plan->absence);
+  memcpy(plan->paths.clock.absent, plan->absence.legs, sizeof plan->absence.legs);
+  hx_foot_paths_join(&model->paths, &plan->paths, &hx_walk_plan_step(plan, 0)->feet,
+                     &model->absent, &plan->absence, back);
   plan->has_after = 0;
   plan->at = 0;
   plan->last = INT64_MAX;
@@ -228,6 +264,7 @@ static inline void hx_walk_plan_foot(const hxWalkPlanModel *model, hxWalkPlan *p
 
 /* Returns the height of the path of a foot over the stance [m]. */
 static inline double hx_walk_plan_lift(const hxWalkPlanModel *model, hxWalkPlan *plan, int k) {
+  if (plan->paths.clock.absent[k]) return 0.0;
   return hx_walk_plan_step(plan, 0)->feet.height[k] - model->paths.home_height[k];
 }
 

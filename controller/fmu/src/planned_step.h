@@ -73,16 +73,17 @@ static inline void place_legs(const hxLegSolver leg[HX_LEGS], hxPlannedStep *ste
   reach_all(leg, (const hxPlane *)step->shift, step);
 }
 
-/* Computes the poses of the legs and the point masses for a torso that has moved. */
+/* Computes the poses of the legs and the point masses for a torso that has moved. presence: factors
+ * on the activations. */
 static inline void stand(const hxStepPlanner *model, const hxGaitClock *clock,
-                         hxPlannedStep *step) {
+                         const double presence[HX_LEGS], hxPlannedStep *step) {
+  memcpy(step->activation, presence, sizeof step->activation);
   for (int k = 0; k < HX_LEGS; ++k) step->plane[k] = hx_plane_sub(step->feet.plane[k], step->torso);
   if (model->compliant) {
     hx_compliant_lowered(&model->laws, clock, step->feet.phase, step->plane, step->activation,
                          step->lowering);
   } else {
     memset(step->lowering, 0, sizeof step->lowering);
-    for (int k = 0; k < HX_LEGS; ++k) step->activation[k] = 1.0;
   }
   for (int k = 0; k < HX_LEGS; ++k) step->height[k] = step->feet.height[k] - step->lowering[k];
   place_legs(model->leg, step);
@@ -94,20 +95,28 @@ static inline void stand(const hxStepPlanner *model, const hxGaitClock *clock,
 }
 
 /* Computes way of the torso, poses of the legs and point masses for planned feet. clock: of the
- * gait, in the section of the step. */
+ * gait, in the section of the step; ahead: periods from the present step. */
 static inline void hx_step_planner_lay_out(const hxStepPlanner *model, const hxGaitClock *clock,
-                                           const hxCompliant *laws, hxPlannedStep *step) {
+                                           const hxCompliant *laws, const hxAbsenceModel *absent,
+                                           const hxAbsence *absence, int64_t ahead,
+                                           hxPlannedStep *step) {
   const hxSway *sway = &model->sway;
   const double narrowing = laws->adaptation.narrowing;
-  step->torso = hx_plane(0.0, 0.0);
+  const hxPlane away = hx_absence_torso(absent, absence, ahead);
+  double presence[HX_LEGS];
+  for (int k = 0; k < HX_LEGS; ++k)
+    presence[k] = hx_absence_presence(absent, absence, k, ahead);
+  step->torso = away;
   if (model->compliant && hx_sway_acts(sway, narrowing)) {
     const double laden = hx_load_adaptation_laden(&laws->adaptation);
     step->torso = hx_sway_guess(sway, &step->feet, laden);
-    stand(model, clock, step);
-    step->torso = hx_scaled(
-        hx_sway_of(sway, &model->laws.dynamics, step->torso, &step->masses, laden), narrowing);
+    stand(model, clock, presence, step);
+    step->torso = hx_plane_add(
+        away,
+        hx_scaled(hx_sway_of(sway, &model->laws.dynamics, step->torso, &step->masses, laden),
+                  narrowing));
   }
-  stand(model, clock, step);
+  stand(model, clock, presence, step);
 }
 
 /* Returns the weight that moves with the torso over the modelled one [1] (C53). */

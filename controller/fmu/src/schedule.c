@@ -18,7 +18,7 @@ typedef struct {
 } hxSaved;
 
 static const uint64_t magic = 0x72746e6f43507868u; /* "hxPContr" */
-static const uint64_t saved_version = 8;
+static const uint64_t saved_version = 9;
 /* 1, of a period: a tick that is later than the present time by less than this is due */
 static const double clock_tolerance = 0.01;
 
@@ -78,6 +78,19 @@ const hxGait *hx_controller_gait(const hxController *controller) {
   return &controller->definition.gait;
 }
 
+/* Begins a change to the gait of the legs in service, with one that comes back (C58). back: as in
+ * the state. */
+static void change(hxController *controller, int back) {
+  hxControllerState *state = present(controller);
+  hxControllerDefinition definition = controller->definition;
+  int absent[HX_LEGS];
+  memcpy(absent, state->plan.absence.legs, sizeof absent);
+  if (back) absent[back - 1] = 0;
+  hx_gait_without(&definition.gait, (const int *)absent, state->plan.ramp.target[0] < 0.0);
+  hx_controller_compile(&definition, &controller->model[1 - state->model]);
+  hx_controller_change(controller->model, back, state);
+}
+
 hxStatus hx_controller_change_gait(hxController *controller, const hxGait *gait) {
   char message[HX_MESSAGE_SIZE];
   const hxGait before = controller->definition.gait;
@@ -87,9 +100,8 @@ hxStatus hx_controller_change_gait(hxController *controller, const hxGait *gait)
     controller->definition.gait = before;
     return refuse(controller, status, message);
   }
-  hxControllerState *state = present(controller);
-  hx_controller_compile(&controller->definition, &controller->model[1 - state->model]);
-  hx_controller_change(controller->model, state);
+  hx_walk_plan_end(&present(controller)->plan);
+  change(controller, 0);
   controller->is_ahead = 0;
   return HX_OK;
 }
@@ -207,6 +219,7 @@ hxStatus hx_controller_step(hxController *controller, const hxControllerInput *i
     if (rate) ramp_input(input, rate, fmax(next_tick(controller) - start, 0.0), &ramped);
     tick(controller, rate ? &ramped : input, controller->now == before);
     if (is_finite(&state_of(controller)->output)) {
+      if (state_of(controller)->regait) change(controller, state_of(controller)->back);
       hx_controller_adopt(controller->model, present(controller));
       continue;
     }

@@ -13,10 +13,12 @@ HX_HIDDEN_BEGIN
 
 typedef struct hxControllerModel {
   int paper; /* the paper's control; otherwise compliant or kinematic control */
+  int feels; /* not kinematic control: its servos are watched */
   hxGait gait;
   hxWalkPlanModel plan;
   hxPaperModel corrections; /* of the paper's control */
   hxFadeModel fade;
+  hxHealthModel health;
 } hxControllerModel;
 
 typedef struct hxControllerState {
@@ -29,6 +31,9 @@ typedef struct hxControllerState {
   hxFade fade;  /* from the control before */
   int model;    /* index of the present model; the other one is that of the next gait */
   int changing; /* to the other model */
+  hxHealth health;
+  int regait; /* the legs in service have changed: the other model is to be that of their gait */
+  int back;   /* a leg that is taken back into service with the next gait, counted from 1; 0: none */
   hxControllerOutput output; /* of the last tick */
 } hxControllerState;
 
@@ -53,8 +58,8 @@ void hx_controller_begin(const hxControllerModel *model, double t, hxControllerS
  * the gait is being changed (C55). The models differ in their gaits only. */
 void hx_controller_adopt(hxControllerModel model[2], hxControllerState *state);
 
-/* Begins a change to the gait of the other model (C55). */
-void hx_controller_change(hxControllerModel model[2], hxControllerState *state);
+/* Begins a change to the gait of the other model (C55). back: as in the state. */
+void hx_controller_change(hxControllerModel model[2], int back, hxControllerState *state);
 
 /* Goes on under another control, which the present model has been compiled for, in the present
  * phase of the walk: the plan keeps its state, the laws begin anew, and the joint commands fade

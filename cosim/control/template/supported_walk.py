@@ -12,7 +12,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.controller import BodyCommand, JointCommand, LegSolver, Measurement
+from hexapod_cosim.controller import (
+    BodyCommand,
+    Diagnostics,
+    JointCommand,
+    LegSolver,
+    Measurement,
+)
 from hexapod_cosim.models import Robot
 
 DUTY = 0.6  # 1    part of its cycle for which a leg stands
@@ -43,11 +49,14 @@ class SupportedWalk:
         self.legs = LegSolver(robot)
         self.home = self.legs.forward(robot.stance)  # m    (6, 3) feet of the stance, torso frame
         self.angle = robot.stance  # rad    (6, 3)
+        self.diagnostics = Diagnostics()  # the plan, with which metrics compare the feet
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
         """Returns the joint commands for the next macro-step."""
         phase = (t / self.cycle + PHASE) % 1.0
         feet = self.feet(phase, command, ramp=min(t / self.cycle, 1.0))
+        self.diagnostics.planned[:] = feet
+        self.diagnostics.swinging[:] = phase > DUTY
         angle = self.legs.inverse(feet)
         speed = (angle - self.angle) / self.period
         self.angle = angle

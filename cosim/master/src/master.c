@@ -27,12 +27,27 @@ static void read_sensors(const hxMaster *master) {
   hx_sensors_read(&master->torso, master->step, value);
 }
 
+/* sets the parameters that change before this macro-step */
+static int tune(hxMaster *master) {
+  const hxStepFmu *plant = &master->stepper.plant;
+  for (; master->tuned < master->tunings; ++master->tuned) {
+    const hxTuning *next = master->tuning + master->tuned;
+    if (next->step > master->step) break;
+    master->stepper.status = plant->set_reals(plant->instance, &next->reference, 1, &next->value);
+    if (master->stepper.status <= 1) continue;
+    master->stepper.call = HX_CALL_PLANT_SET;
+    return 0;
+  }
+  return 1;
+}
+
 static int macro_step(hxMaster *master) {
   hxStepper *stepper = &master->stepper;
   const size_t k = master->step;
   if (master->push)
     memcpy(stepper->value + master->push_place, master->push + k * master->push_count,
            master->push_count * sizeof *master->push);
+  if (master->tuning && !tune(master)) return 0;
   read_sensors(master);
   if (!hx_macro_step(stepper, master->time[k], master->command + k * stepper->command_count, adjust,
                      record, master))
@@ -46,7 +61,7 @@ int hx_master_layout(void) { return HX_MASTER_LAYOUT; }
 size_t hx_master_size(void) { return sizeof(hxMaster); }
 
 int hx_master_begin(hxMaster *master) {
-  master->step = master->recorded = 0;
+  master->step = master->recorded = master->tuned = 0;
   master->stepper.call = HX_CALL_NONE;
   master->stepper.status = 0;
   return hx_read_plant(&master->stepper);

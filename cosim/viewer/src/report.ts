@@ -9,7 +9,7 @@ import { unpack } from "./recording";
 import { Actor } from "./scene/actor";
 import { Stage } from "./scene/stage";
 import { Relief, unpackSurface } from "./scene/surface";
-import { enlargement, findStances } from "./scene/trails";
+import { enlargement, findStancePhases } from "./scene/trails";
 import { property, readColours, Theme } from "./theme";
 import { listenToKeys, makeWindowButtons, Transport } from "./transport";
 import type { Payload } from "./types";
@@ -143,7 +143,7 @@ function runFrames(clock: Clock, stage: Stage | undefined): void {
 async function addTrails(stage: Stage): Promise<void> {
   await nextTask();
   const found = stage.actors.map(({ recording, run, relief }) =>
-    findStances(recording, run.robot, relief),
+    findStancePhases(recording, run.robot, relief),
   );
   const enlarged = enlargement(found.flat());
   stage.actors.forEach((actor, k) => {

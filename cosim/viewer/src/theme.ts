@@ -2,13 +2,11 @@ import { Color } from "three";
 
 /** Custom properties of the page's style sheet with the colours that the 3D view needs. */
 const NAMES = [
-  ...(["sky", "floor", "grid", "force", "contact", "contour", "edge"] as const),
+  ...(["sky", "floor", "grid", "force", "contact", "contour"] as const),
   ...(["soil", "slippery", "patch"] as const),
 ];
 
 export type Colours = Readonly<Record<(typeof NAMES)[number], Color>> & { readonly dark: boolean };
-
-const KEY = "hexapod-report-theme";
 
 /** Returns a custom property of the page, such as --ink. */
 export function property(name: string): string {
@@ -25,13 +23,11 @@ export function isDark(): boolean {
   return chosen ? chosen === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
 }
 
-/** The light or dark theme: the system's, or the reader's choice, stored if the browser can. */
+/** The light or dark theme: the system's, or the reader's choice for this page. */
 export class Theme {
   private readonly listeners: (() => void)[] = [];
 
   constructor(button: HTMLButtonElement | null) {
-    const stored = storedTheme();
-    if (stored) document.documentElement.dataset.theme = stored;
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.notify());
     button?.addEventListener("click", () => this.toggle());
   }
@@ -43,24 +39,11 @@ export class Theme {
   toggle(): void {
     const theme = isDark() ? "light" : "dark";
     document.documentElement.dataset.theme = theme;
-    try {
-      localStorage.setItem(KEY, theme);
-    } catch {
-      // a page opened from disk may have no storage: the choice then lasts as long as the page
-    }
     this.notify();
   }
 
   private notify(): void {
     for (const listener of this.listeners) listener();
-  }
-}
-
-function storedTheme(): string | null {
-  try {
-    return localStorage.getItem(KEY);
-  } catch {
-    return null;
   }
 }
 

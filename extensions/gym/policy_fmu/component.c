@@ -53,7 +53,7 @@ void hx_component_get_state(const hxComponent *component, void *bytes) {
 }
 
 hxStatus hx_component_set_state(hxComponent *component, const void *bytes) {
-  return hx_policy_set_state(policy_of(component), bytes, hx_policy_state_size());
+  return hx_policy_set_state(policy_of(component), bytes);
 }
 
 const hxContinuous *const hx_continuous = NULL;

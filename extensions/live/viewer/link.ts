@@ -34,7 +34,7 @@ export class Listeners {
     this.lists[kind].push(listener);
   }
 
-  protected tell<K extends Kind>(kind: K, message: Received[K]): void {
+  protected emit<K extends Kind>(kind: K, message: Received[K]): void {
     for (const listener of this.lists[kind]) listener(message);
   }
 }
@@ -81,7 +81,7 @@ export class Link extends Listeners implements Connection {
     const message = JSON.parse(text) as Received[Kind] & { readonly type: Kind };
     this.heard = performance.now();
     if (this.state === "silent") this.become("open");
-    this.tell(message.type, message);
+    this.emit(message.type, message);
   }
 
   /** A loop that is paused is silent as well, which is no fault. */

@@ -1,6 +1,6 @@
 import { bodyCommand } from "./drive";
 import { type Connection, Listeners } from "./link";
-import type { Limits, Settings, Setup, World } from "./messages";
+import type { Settings, StaticSetup } from "./messages";
 
 const LONGEST = 1; // s    made up at once; a longer gap, as of a hidden page, is skipped
 /** Sizes of the parts of the module's row of values (extensions/live/wasm/robot.c). */
@@ -8,23 +8,6 @@ const SIZES = {
   ...{ time: 1, angle: 18, jointSpeed: 18, torque: 18, force: 18, slip: 6 },
   ...{ position: 3, quaternion: 4, attitude: 3, velocity: 3, rate: 3, joints: 54, push: 3 },
 };
-
-/** What the page holds (extensions/live/static_page.py). */
-export interface StaticSetup extends Setup {
-  readonly world: World;
-  readonly first: Settings;
-  /** hxControl by name. */
-  readonly numbers: Record<string, number>;
-  readonly walks: Record<string, Walk>;
-}
-
-interface Walk {
-  /** Pattern, period, duty, step height, touch-down speed. */
-  readonly gait: number[];
-  readonly limits: Limits;
-  /** Plans of changes to other gaits (extensions/live/settings.py); times since the request. */
-  readonly changes: Record<string, Record<"begin" | "end", number> & { limits: Limits }>;
-}
 
 /** Steps the robot in this page in real time, and answers the page as a server does. */
 export class LocalLoop extends Listeners implements Connection {
@@ -44,10 +27,10 @@ export class LocalLoop extends Listeners implements Connection {
     super();
     const { first: settings } = setup;
     const { limits } = setup.walks[settings.gait];
-    const flags = { stopped: true, paused: false, recording: false, recorded: false };
+    const flags = { stopped: true, paused: true, recording: false, recorded: false };
     this.status = { ...flags, settings, wanted: settings, limits, fault: "" };
     setTimeout(() => {
-      this.tell("world", setup.world);
+      this.emit("world", setup.world);
       this.attempt(() => {
         this.call("_initialize");
         this.do("create");
@@ -65,6 +48,7 @@ export class LocalLoop extends Listeners implements Connection {
   send({ type, key, value, action, ...input }: Record<string, unknown>): void {
     this.attempt(() => {
       if (type === "set") this.set(key as keyof Settings, value as string & number);
+      else if (type === "leg") this.do("leg", input.leg as number);
       else if (action === "place") this.place();
       else if (type === "do") this.status.paused = action === "pause";
       else Object.assign(this.input, input);
@@ -79,7 +63,7 @@ export class LocalLoop extends Listeners implements Connection {
     } catch (error) {
       this.status.fault = String(error);
     }
-    if (JSON.stringify(this.status) !== before) this.tell("status", { ...this.status });
+    if (JSON.stringify(this.status) !== before) this.emit("status", { ...this.status });
   }
 
   /** Simulates the time that has passed since the last picture. */
@@ -100,7 +84,7 @@ export class LocalLoop extends Listeners implements Connection {
     this.do("advance", count, ...bodyCommand(this.input, this.status.limits), x, y, z);
     const [time] = this.row().time;
     while (this.plan.length > 0 && time >= this.plan[0][0]) this.plan.shift()![1]();
-    this.tellFrame();
+    this.emitFrame();
   }
 
   private place(): void {
@@ -112,7 +96,7 @@ export class LocalLoop extends Listeners implements Connection {
     Object.assign(status, { settings: status.wanted, limits, fault: "", paused: false });
     [this.plan, this.due] = [[], 0];
     this.placed += 1;
-    this.tellFrame();
+    this.emitFrame();
   }
 
   private set(key: keyof Settings, value: string & number): void {
@@ -125,25 +109,24 @@ export class LocalLoop extends Listeners implements Connection {
   }
 
   private planChange(gait: string): void {
-    const { status } = this;
-    const { walks } = this.setup;
-    const { begin, end, limits } = walks[status.settings.gait].changes[gait];
+    const { status, setup } = this;
+    const { begin, end, limits } = setup.walks[status.settings.gait].changes[gait];
     const [since] = this.row().time;
-    const { gait: timing, limits: usual } = walks[gait];
     const change = () => {
-      this.do("gait", ...timing);
+      this.do("gait", ...setup.walks[gait].gait);
       status.settings = { ...status.settings, gait };
     };
-    status.limits = limits;
+    const { limits: usual } = setup.walks[gait];
     this.plan = [[since + begin, change]];
     this.plan.push([since + end, () => Object.assign(status, { limits: usual })]);
+    status.limits = limits;
   }
 
-  private tellFrame(): void {
+  private emitFrame(): void {
     const row = this.row();
     const force = row.force.map((part) => part / this.setup.world.weight);
     const command = bodyCommand(this.input, this.status.limits);
-    this.tell("frame", { ...row, time: row.time[0], force, command, placed: this.placed });
+    this.emit("frame", { ...row, time: row.time[0], force, command, placed: this.placed });
   }
 
   /** Returns the module's row of values. SI units; legs LF LM LR RF RM RR. */

@@ -1,7 +1,7 @@
 import { byId, element } from "../../../cosim/viewer/src/dom";
 import { Link } from "./link";
-import { LocalLoop, type StaticSetup } from "./local";
-import type { Setup } from "./messages";
+import { LocalLoop } from "./local";
+import type { Setup, StaticSetup } from "./messages";
 import { start } from "./page";
 
 /** Starts the robot of a page that holds plant and controller, or says why it cannot walk here. */

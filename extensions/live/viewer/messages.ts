@@ -88,3 +88,20 @@ export interface Setup {
   readonly gaits: readonly string[];
   readonly grounds: readonly { readonly name: string; readonly about: string }[];
 }
+
+/** What a page without a server holds besides (extensions/live/static_page.py). */
+export interface StaticSetup extends Setup {
+  readonly world: World;
+  readonly first: Settings;
+  /** hxControl by name. */
+  readonly numbers: Record<string, number>;
+  readonly walks: Record<string, Walk>;
+}
+
+interface Walk {
+  /** Pattern, period, duty, step height, touch-down speed. */
+  readonly gait: number[];
+  readonly limits: Limits;
+  /** Plans of changes to other gaits (extensions/live/settings.py); times since the request. */
+  readonly changes: Record<string, { begin: number; end: number; limits: Limits }>;
+}

@@ -81,6 +81,13 @@ export class View {
     return this.scene && this.ray(event).intersectObject(this.scene.model, true)[0]?.point;
   }
 
+  /** Returns the leg (0 to 5) under a pointer; undefined beside the legs. */
+  legAt(event: PointerEvent): number | undefined {
+    return (
+      this.scene && this.ray(event).intersectObject(this.scene.model, true)[0]?.object.userData.leg
+    );
+  }
+
   /**
    * Returns the push [body weights] of a drag from a point of the robot to the pointer: along the
    * ground, or upwards with `lift`.
@@ -131,12 +138,14 @@ const MOST_WEIGHTS = 3; // body weights    largest push
 const OFTEN = 40; // ms    between two pushes at the most
 const RENEW = 300; // ms    between two that are the same
 
-/** Pushes the robot while a pointer drags from it: along the ground, with shift upwards. */
+/** Pushes the robot while a pointer drags from it: along the ground, with shift upwards. A click on
+ * a leg makes it limp, or healthy again. */
 export class Pusher {
   private pointer = -1;
   private offset: Vector3 | undefined;
   private event: PointerEvent | undefined;
   private sent = "";
+  private moved = false; // since the pointer went down; else it is a click
   private at = 0;
 
   constructor(
@@ -164,11 +173,12 @@ export class Pusher {
     this.pointer = event.pointerId;
     this.offset = hit.clone().sub(this.view.ground);
     this.event = event;
+    this.moved = false;
     this.view.canvas.classList.add("pushing");
   }
 
   private move(event: PointerEvent): void {
-    if (event.pointerId === this.pointer) this.event = event;
+    if (event.pointerId === this.pointer) [this.event, this.moved] = [event, true];
     else if (event.buttons === 0)
       this.view.canvas.classList.toggle("grip", this.view.hit(event) !== undefined);
   }
@@ -179,6 +189,8 @@ export class Pusher {
     this.event = undefined;
     this.sent = "";
     this.view.canvas.classList.remove("pushing");
+    const leg = this.moved ? undefined : this.view.legAt(event);
+    if (leg !== undefined) this.link.send({ type: "leg", leg });
     this.link.send({ type: "push", x: 0, y: 0, z: 0 });
   }
 

@@ -42,10 +42,8 @@ static double given[sizeof(hxControllerInput) / sizeof(double)];
 static size_t sensed[SENSED];
 static long steps; /* macro-steps since the start */
 
-/* ----------------------------------------------------------------------------------------------
- * plant and controller as the macro-step calls them; an instance is the component's inputs, which
- * begin with the doubles that are set, as the outputs do with those that are read */
-
+/* Plant and controller as the macro-step calls them. An instance is the component's inputs, which
+ * begin with the doubles that are set, as the outputs do with those that are read. */
 static int get_plant(void *instance, const unsigned *reference, size_t count, double *to) {
   (void)reference, (void)count;
   hx_plant_output(plant, instance, &output);
@@ -92,10 +90,7 @@ static hxStepper stepper = {
     .h = 0.005, /* s    that of the scenarios */
 };
 
-/* ----------------------------------------------------------------------------------------------
- * what the page calls */
-
-/* Allocates the robot. */
+/* Allocates the robot. The page calls this and all functions below. */
 HX_API int hx_page_create(void) {
   plant = hx_plant_create();
   controller = hx_controller_create();
@@ -148,15 +143,19 @@ HX_API int hx_page_advance(int count, double vx, double vy, double yaw_rate, dou
   return HX_OK;
 }
 
+/* Makes a leg's servos limp, or healthy again. */
+HX_API int hx_page_leg(int leg) {
+  if (leg < 0 || leg >= HX_LEGS) return HX_INVALID_ARGUMENT;
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    input.weakness[leg][joint] = 1.0 - input.weakness[leg][joint];
+  return HX_OK;
+}
+
 /* Changes the control while the robot walks. */
 HX_API int hx_page_control(int next) { return hx_controller_change_control(controller, next); }
 
-/* Changes the friction coefficient: the plant begins again in its present pose and motion, with
- * which its coordinates begin as well. */
+/* Changes the friction coefficient while the robot walks. */
 HX_API int hx_page_friction(double friction) {
-  hxCoordinates present;
-  hx_plant_get_coordinates(plant, &present);
-  memcpy(&definition.initial, &present, sizeof definition.initial);
   definition.friction.mu = friction;
-  return hx_plant_reset(plant, &definition, hx_plant_time(plant));
+  return hx_plant_tune(plant, &definition);
 }

@@ -95,15 +95,16 @@ typedef struct hxOutput {
     double angular_velocity[3]; /* rad/s  torso axes */
   } imu;
   struct {
-    double kinetic;       /* J  bodies and rotors */
-    double potential;     /* J  gravity and the elastic parts of contacts, stops and gears */
-    double actuator_work; /* J  by the motors on the joints */
-    double push_work;     /* J  by push_force and push_torque */
-    double dissipated;    /* J  in contact, friction (with bristles' energy) and gears */
-    double contact_loss;  /* J  in the normal contact */
-    double friction_loss; /* J  in friction */
-    double gear_loss;     /* J  in the gears and at the joints' stops */
-    double residual;      /* J  stored - stored at start - works + dissipated: audit error */
+    double kinetic;        /* J  bodies and rotors */
+    double potential;      /* J  gravity and the elastic parts of contacts, stops and gears */
+    double actuator_work;  /* J  by the motors on the joints */
+    double push_work;      /* J  by push_force and push_torque */
+    double dissipated;     /* J  in contact, friction (with bristles' energy) and gears */
+    double contact_loss;   /* J  in the normal contact */
+    double friction_loss;  /* J  in friction */
+    double gear_loss;      /* J  in the gears and at the joints' stops */
+    double residual;       /* J  stored - stored at start - works + dissipated: audit error */
+    double parameter_work; /* J  by changes of tunable parameters */
   } energy;
   struct {
     double position_error; /* m or 1          norm of Phi */
@@ -194,6 +195,12 @@ HX_API void hx_plant_set_terrain(hxPlant *plant, const hxTerrain *terrain);
 /* Sets a definition and its initial state at time t, s. On failure only the plant's message
  * changes. */
 HX_API hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t);
+
+/* Changes parameters while the plant runs: those of a definition that plant_settings.h calls
+ * tunable. The others must be as in the last reset. The pose and motion of all bodies stay,
+ * contacts keep their impact speeds, and the energy that the change gives is booked as
+ * parameter_work. On failure only the plant's message changes. */
+HX_API hxStatus hx_plant_tune(hxPlant *plant, const hxDefinition *definition);
 
 /* Advances the plant to t_end >= time, exactly. On failure only the plant's message changes. */
 HX_API hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end);

@@ -11,8 +11,7 @@
 HX_HIDDEN_BEGIN
 
 /* Write a text of at most size - 1 characters, as snprintf does in the locale "C": a process may
- * have set a locale in which 1.5 is "1,5". Known conversions: %s %d %u %zu %lld %llu %f %g %%,
- * where %s, %f and %g may have a precision; another one ends the text. */
+ * have set a locale in which 1.5 is "1,5". */
 #if defined(__GNUC__)
 __attribute__((format(printf, 3, 4)))
 #endif

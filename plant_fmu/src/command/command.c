@@ -11,7 +11,7 @@ void hx_command_from_input(hxCommand *command, const hxInput *input, double time
       command->speed[joint][slot] = input->speed_ref[leg][joint];
       command->torque[joint][slot] = input->torque_ref[leg][joint];
       command->acceleration[joint][slot] = input->acceleration_ref[leg][joint];
-      command->strength[joint][slot] = input->strength[leg][joint];
+      command->weakness[joint][slot] = input->weakness[leg][joint];
     }
   for (int i = 0; i < 3; ++i) {
     command->push_force[i] = input->push_force[i];
@@ -27,7 +27,8 @@ void hx_command_from_input(hxCommand *command, const hxInput *input, double time
 static double motor_duty(const hxCommand *command, const hxModel *model, const hxState *state,
                          int joint, int leg, double *speed) {
   const double angle = state->moment.angle[joint][leg], w = state->moment.speed[joint][leg];
-  const double share = command->strength[joint][leg], per_torque = model->duty_max / model->stall_torque;
+  const double share = 1.0 - command->weakness[joint][leg],
+               per_torque = model->duty_max / model->stall_torque;
   const double limit = share * model->duty_max * command->duty[joint][leg];
   const double free = (1.0 - share) * per_torque * model->back_emf * w; /* without a current */
   double wanted = model->kp * (command->angle[joint][leg] - angle) +
@@ -155,7 +156,6 @@ void hx_count_overload(const hxCommand *command, const hxModel *model, hxState *
         command->torque[joint][slot];
     double *loaded = &state->firmware.loaded[joint][slot];
     const double side = copysign(1.0, wanted);
-    *loaded =
-        fabs(wanted) >= model->overload_torque ? side * (fmax(side * *loaded, 0.0) + h) : 0.0;
+    *loaded = fabs(wanted) >= model->overload_torque ? side * (fmax(side * *loaded, 0.0) + h) : 0.0;
   }
 }

@@ -23,7 +23,7 @@ typedef struct hxFootprints {
 typedef struct hxFootprintLog {
   hxFootprints kept;
   double call_start; /* 1  footprints made before the present call */
-  hxFootprint lost[HX_FOOTPRINTS];
+  hxFootprint *lost; /* [HX_FOOTPRINTS]  in the work space */
 } hxFootprintLog;
 
 /* Removes all footprints. */

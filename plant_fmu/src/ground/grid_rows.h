@@ -46,30 +46,8 @@ static inline void query_grid(const hxModel *model, const hxContactState *state,
 enum {
   HX_CLOSED, /* those that are closed */
   HX_ALL,
-  HX_NEAR,  /* those that are closed, and open ones that may touch the ground */
-  HX_LISTED /* those that are closed, and open ones of lanes whose bits follow these two */
+  HX_NEAR /* those that are closed, and open ones that may touch; on blocks all feet */
 };
-
-/* Returns the choice of closed contacts, and of open ones in these lanes. */
-static inline int hx_listed(int lanes) { return lanes ? HX_LISTED | lanes << 2 : HX_CLOSED; }
-
-/* Returns whether the choice contains the open contacts of a lane. */
-static inline int hx_is_listed(int all, int lane) {
-  return all == HX_ALL || ((all & 3) == HX_LISTED && (all >> (2 + lane) & 1));
-}
-
-/* Computes the face of a grid under the sphere of an open contact, or, where the ground around it
- * is lower, the least distance that it may have. */
-HX_INLINE void query_near_grid(const hxModel *model, const hxContactState *state, hxFaceKind kind,
-                               int row, int slot, const hxNumber point[3], hxFace *face) {
-  const double real[3] = {hx_re(point[0]), hx_re(point[1]), hx_re(point[2])},
-               radius = hx_re(model->radius[row]),
-               bound = hx_terrain_depth_bound(model->terrain, real, radius);
-  if (bound <= 0.0)
-    face->distance = radius - bound;
-  else
-    query_grid(model, state, kind, slot, point, face);
-}
 
 #ifndef HX_TANGENT
 /* Returns the heights of the highest blocks within 20 mm of points along x and y. */
@@ -130,26 +108,6 @@ HX_RARE hxReal hx_grid_depth_bound(const hxModel *model, int row, const hxVec3 *
 #endif
 
 #ifndef HX_TANGENT
-/* Finds the distances of points from patches that are kept and level, and returns in which of the
- * lanes `wanted` they are those of find_by_kept_patches. */
-static inline hxMask level_patches(const hxTerrain *terrain, hxMask wanted, const hxReal point[3],
-                                   const hxPatchNodes *of, hxReal *distance, hxReal normal[3]) {
-  const hxGridHead *head = &terrain->head;
-  const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
-  if (hx_any(wanted & ~hx_less(zero, hx_load(of->is_kept)))) return wanted ^ wanted;
-  const hxReal sx = hx_load(of->patch[1]), sy = hx_load(of->patch[2]);
-  const hxReal bend = (hx_abs(hx_load(of->patch[3])) + hx_abs(hx_load(of->patch[4]))) +
-                      hx_abs(hx_load(of->patch[5]));
-  if (hx_any(wanted & hx_less(zero, (hx_abs(sx) + hx_abs(sy)) + bend))) return wanted ^ wanted;
-  const hxReal dx = point[0] - hx_load(of->x), dy = point[1] - hx_load(of->y);
-  const hxReal u = (point[0] - head->x0) * terrain->per_cell - hx_load(of->col),
-               v = (point[1] - head->y0) * terrain->per_cell - hx_load(of->row);
-  *distance = point[2] - hx_load(of->patch[0]);
-  normal[0] = -sx, normal[1] = -sy, normal[2] = one;
-  return wanted & ~hx_less(hx_splat(close * (head->cell * head->cell)), dx * dx + dy * dy) &
-         hx_less(u, one) & hx_less(v, one) & ~(hx_less(u, zero) | hx_less(v, zero));
-}
-
 /* Returns distance and normal of a smooth grid at a row's points. */
 HX_RARE hxGround hx_smooth_grid(const hxModel *model, const hxContactState *state, int row,
                                 int slot, int all, const hxVec3 *point, hxPatchNodes *nodes) {
@@ -172,24 +130,26 @@ HX_RARE hxGround hx_smooth_grid(const hxModel *model, const hxContactState *stat
     hx_forget_nodes(&own);
     nodes = &own;
   }
-  hxReal exact = zero;
-  if (hx_any(wanted & ~level_patches(model->terrain, wanted, at, nodes, &exact, normal))) {
-    const hxNearest nearest = hx_nearest_on_surface(model->terrain, wanted, at, from, 0, nodes);
-    exact = hx_distance_from_surface(&nearest, at, normal);
-  }
+  const hxNearest nearest = hx_nearest_on_surface(model->terrain, wanted, at, from, 0, nodes);
+  const hxReal exact = hx_distance_from_surface(&nearest, at, normal);
   return (hxGround){hx_select(wanted, exact, distance),
                     {hx_select(wanted, normal[0], zero), hx_select(wanted, normal[1], zero),
                      hx_select(wanted, normal[2], one)}};
 }
 #endif
 
-/* Returns distance and normal of a grid at a row's points, lane by lane. */
+/* Returns distance and normal of a grid at a row's points, lane by lane; where the ground around an
+ * open contact is lower, the least distance that it may have. */
 HX_RARE hxGround hx_grid(const hxModel *model, const hxContactState *state, int row, int slot,
                          int all, const hxVec3 *point) {
   static const hxFaceKind kind[HX_ROWS] = {HX_FACE_TOP,    HX_FACE_WALL,    HX_FACE_SIDE,
                                            HX_FACE_CORNER, HX_FACE_NEAREST, HX_FACE_NEAREST,
                                            HX_FACE_NEAREST};
   hxNumber at[3][HX_LANES], distance[HX_LANES], normal[3][HX_LANES];
+  double bound[HX_LANES] = {0.0};
+#ifndef HX_TANGENT
+  if (all == HX_NEAR) hx_store(bound, hx_grid_depth_bound(model, row, point));
+#endif
   hx_store(at[0], point->x), hx_store(at[1], point->y), hx_store(at[2], point->z);
   for (int lane = 0; lane < HX_LANES; ++lane) {
     const int place = slot + lane, mirrors = row != HX_TORSO && place >= HX_LEGS && slot == 0;
@@ -201,10 +161,10 @@ HX_RARE hxGround hx_grid(const hxModel *model, const hxContactState *state, int 
       continue;
     }
     hxFace face = {.distance = hx_far, .normal = {0.0, 0.0, 1.0}};
-    if (hx_is_listed(all, lane) || hx_re(state->closed[row][place]) != 0.0)
+    if (all == HX_ALL || hx_re(state->closed[row][place]) != 0.0 || bound[lane] > 0.0)
       query_grid(model, state, kind[row], place, p, &face);
     else if (all == HX_NEAR)
-      query_near_grid(model, state, kind[row], row, place, p, &face);
+      face.distance = hx_re(model->radius[row]) - bound[lane];
     put_face(&face, p, &distance[lane], n);
     for (int i = 0; i < 3; ++i) normal[i][lane] = n[i];
   }
@@ -213,16 +173,6 @@ HX_RARE hxGround hx_grid(const hxModel *model, const hxContactState *state, int 
 }
 
 #ifndef HX_TANGENT
-/* Returns which open contacts of a pack the choice contains. */
-static inline hxMask listed_lanes(int all, int slot) {
-  static const int64_t first[8] = {2, 3, 4, 5, 6, 7, 2, 2}, further[8] = {2, 3, 4, 5, 6, 7, 8, 9};
-  const int64_t *place = slot == 0 ? first : further;
-  hxMask bit;
-  memcpy(&bit, place, sizeof bit);
-  const hxMask none = bit ^ bit;
-  return all == HX_ALL ? ~none : -(((none + (int64_t)all) >> bit) & 1);
-}
-
 /* Copies the tops of cells and of those beside them to node[1 + along y][1 + along x], those beyond
  * the border being its own. */
 HX_RARE void copy_cells(const hxTerrain *terrain, hxReal col, hxReal row, hxPatchNodes *nodes) {
@@ -261,7 +211,7 @@ static inline void cells_below(const hxTerrain *terrain, const hxVec3 *point, hx
 /* Returns which contacts of a pack of feet the choice contains. */
 static inline hxMask wanted_lanes(const hxContactState *state, int row, int slot, int all) {
   const hxMask closed = hx_less(hx_splat(0.0), hx_load(&state->closed[row][slot]));
-  return all == HX_CLOSED ? closed : closed | listed_lanes(all, slot);
+  return all == HX_CLOSED ? closed : closed | ~closed;
 }
 
 /* Returns the distances of feet from the tops of the columns that are held for them, or below them;
@@ -376,7 +326,7 @@ HX_INLINE hxGround hx_ground(const hxModel *model, const hxContactState *state, 
   if (model->terrain_kind == HX_TERRAIN_GRID &&
       hx_terrain_surface(model->terrain) == HX_SURFACE_SMOOTH)
     return hx_smooth_grid(model, state, row, slot, all, &point, nodes);
-  if (model->terrain_kind == HX_TERRAIN_GRID && row < HX_FOOT_ROWS && all != HX_NEAR)
+  if (model->terrain_kind == HX_TERRAIN_GRID && row < HX_FOOT_ROWS)
     return row == HX_FOOT ? hx_block_tops(model, state, slot, all, &point, nodes)
                           : hx_block_sides(model, state, row, slot, all, &point, nodes);
 #endif

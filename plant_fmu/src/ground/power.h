@@ -1,5 +1,5 @@
 /* power.h - powers of a pack of numbers in plain arithmetic: the kernels include it behind lanes.h,
- * elementary.c behind one_lane.h, with the same bits for each number */
+ * elementary.c with one lane, with the same bits for each number */
 #ifndef HX_POWER_H
 #define HX_POWER_H
 

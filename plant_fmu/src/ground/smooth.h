@@ -1,5 +1,5 @@
 /* smooth.h - nearest points of a smooth surface (eq. 31, 32) to a pack of points: the kernels
- * include it behind lanes.h, surface.c behind one_lane.h, with the same bits for each point */
+ * include it behind lanes.h, surface.c with one lane, with the same bits for each point */
 #ifndef HX_SMOOTH_H
 #define HX_SMOOTH_H
 

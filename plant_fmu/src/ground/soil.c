@@ -4,7 +4,9 @@
 #include <string.h>
 
 #include "../elementary.h"
-#include "one_lane.h"
+
+#define HX_LANES 1
+#include "../lanes/lanes.h"
 
 #include "soil_law.h" /* behind the numbers that it computes with */
 
@@ -66,79 +68,8 @@ int hx_soil_row_error(const double row[13]) {
   return -1;
 }
 
-/* ---- one foot ---- */
-
-/* Returns the pack that holds one soil. */
-static hxSoils only(const hxSoil *soil) {
+double hx_soil_plastic_depth(const hxSoil *soil, double z) {
   hxSoils soils;
   memcpy(&soils, soil, sizeof soils);
-  return soils;
-}
-
-static hxSoilCurve curve_of(hxSoilCurves only) { return (hxSoilCurve){only.force, only.slope}; }
-
-static hxSoilForce force_of(hxSoilForces only) {
-  return (hxSoilForce){only.force, only.elastic, only.slope, only.stiffness, only.viscosity};
-}
-
-hxSoilCurve hx_soil_virgin(const hxSoil *soil, double z) {
-  const hxSoils soils = only(soil);
-  return curve_of(hx_virgin(&soils, z));
-}
-
-double hx_soil_plastic_depth(const hxSoil *soil, double z) {
-  const hxSoils soils = only(soil);
   return hx_plastic_depth(&soils, z, hx_virgin(&soils, z));
-}
-
-hxSoilForce hx_soil_normal_force(const hxSoil *soil, double plastic, double z, double dz) {
-  const hxSoils soils = only(soil);
-  return force_of(hx_soil_forces(&soils, plastic, z, dz, hx_virgin(&soils, z)));
-}
-
-double hx_soil_stored_energy(const hxSoil *soil, double plastic, double z) {
-  const hxSoils soils = only(soil);
-  return hx_stored_energy(&soils, plastic, z, hx_virgin(&soils, z));
-}
-
-hxSoilCurve hx_soil_shear_base(const hxSoil *soil, double z) {
-  const hxSoils soils = only(soil);
-  return curve_of(hx_shear_base(&soils, z));
-}
-
-/* Returns the second derivative of the integral of eq. 41, times a pressure modulus, z > 0. */
-static double bend_of_columns(const hxSoil *soil, double modulus, double n, double z) {
-  const double R = soil->radius, p = hx_pow(z, n);
-  if (soil->pad > 0.0) {
-    const double bend = n * (n - 1.0); /* 0: z * z may be 0, too */
-    return bend == 0.0 ? 0.0 : modulus * soil->area * bend * p / (z * z);
-  }
-  const double above = z > R ? hx_pow(z - R, n) : 0.0;
-  return 2.0 * pi * modulus * (p * (n * R / z - 1.0) + above);
-}
-
-/* Returns the second derivative of F_v, N/m2, z > 0. */
-static double virgin_bend(const hxSoil *soil, double z) {
-  const double R = soil->radius, rest = fmax(1.0 - z / R, 0.0);
-  if ((int)soil->law == HX_SOIL_BEKKER)
-    return bend_of_columns(soil, soil->modulus, soil->exponent, z);
-  if ((int)soil->law == HX_SOIL_MUD)
-    return bend_of_columns(soil, soil->yield, 0.0, z) +
-           bend_of_columns(soil, soil->hardening, 1.0, z);
-  if (soil->pad > 0.0 || rest == 0.0) return 0.0;
-  return 2.0 * pi * R * (soil->side + (soil->down - soil->side) * (rest * rest));
-}
-
-hxSoilContact hx_soil_contact(const hxSoil *soil, double plastic, double z, double dz) {
-  const hxSoils soils = only(soil);
-  const hxSoilCurves virgin = hx_virgin(&soils, z);
-  const hxSoilContacts at = hx_soil_contacts(&soils, plastic, z, dz, virgin);
-  hxSoilForce normal = force_of(at.normal);
-  hxSoilCurve held = curve_of(at.held);
-  if (plastic < z && hx_is_yielding(&soils, plastic, z, dz, virgin.force)) {
-    held.slope += normal.elastic * virgin_bend(soil, z) / soil->unloading;
-    if (normal.force > 0.0)
-      normal.stiffness += normal.slope - elastic(&soils, plastic, z, virgin).slope;
-  }
-  return (hxSoilContact){normal, held, curve_of(at.stored), curve_of(at.hold)};
 }

@@ -35,28 +35,6 @@ typedef struct {
   double breadth; /* m  b of eq. 40; 0: the radius */
 } hxSoilShape;
 
-/* A force and its slope by the depth, N and N/m. */
-typedef struct {
-  double force, slope;
-} hxSoilCurve;
-
-/* Normal force of soil and its derivatives. */
-typedef struct {
-  double force;     /* N      f_n */
-  double elastic;   /* N      its elastic part, on the virgin curve or the unloading line */
-  double slope;     /* N/m    the elastic part by z */
-  double stiffness; /* N/m    df_n/dz */
-  double viscosity; /* N s/m  df_n/d(dz/dt) */
-} hxSoilForce;
-
-/* Forces of soil on a foot in contact with it. */
-typedef struct {
-  hxSoilForce normal;
-  hxSoilCurve held;   /* N     times the sinking speed: power that is stored; its slope by z */
-  hxSoilCurve stored; /* J, N  energy that unloading gives back */
-  hxSoilCurve hold;   /* N/m   shear over the bristle without load */
-} hxSoilContact;
-
 /* Computes the constants of a soil under a shape. */
 void hx_soil_compile(const hxSoilDefinition *definition, const hxSoilShape *shape, hxSoil *soil);
 
@@ -67,24 +45,8 @@ void hx_soil_from_row(const double row[13], const hxSoilShape *shape, hxSoil *so
 /* Returns the first of these columns that is not in its range, -1 if there is none. */
 int hx_soil_row_error(const double row[13]);
 
-/* Returns F_v(z), the force of a first monotone loading, and its slope (eq. 40-43). */
-hxSoilCurve hx_soil_virgin(const hxSoil *soil, double z);
-
 /* Returns the depth that stays when depth z is unloaded, z - F_v(z)/(A Ke) >= 0 (eq. 44). */
 double hx_soil_plastic_depth(const hxSoil *soil, double z);
-
-/* Returns f_n of a foot at depth z that sinks at dz (eq. 44, 45); 0 where z <= z_p. */
-hxSoilForce hx_soil_normal_force(const hxSoil *soil, double plastic, double z, double dz);
-
-/* Returns the energy that unloading gives back, J. */
-double hx_soil_stored_energy(const hxSoil *soil, double plastic, double z);
-
-/* Returns the shear force that does not depend on the load, and its slope by the depth (eq. 46):
- * cohesion, and in granular media the resistance of the profile. */
-hxSoilCurve hx_soil_shear_base(const hxSoil *soil, double z);
-
-/* Returns the forces on a foot at depth z that sinks at dz. */
-hxSoilContact hx_soil_contact(const hxSoil *soil, double plastic, double z, double dz);
 
 HX_HIDDEN_END
 

@@ -1,14 +1,16 @@
 /* soil_law.h - forces of soft ground on a pack of feet (eq. 40-47): the kernels include it behind
- * lanes.h, soil.c behind one_lane.h, with the same bits for each foot
+ * lanes.h, soil.c with one lane, with the same bits for each foot
  *
  * z is the depth of the foot's lowest point under the undisturbed surface, z_p the plastic depth.
  */
 #ifndef HX_SOIL_LAW_H
 #define HX_SOIL_LAW_H
 
-#include "../elementary.h"
-#include "power.h"
 #include "soil.h"
+
+#ifndef HX_TANGENT
+#include "power.h"
+#endif
 
 static const double pi = 3.14159265358979323846;
 
@@ -27,9 +29,13 @@ typedef struct hxSoilCurves {
   hxReal force, slope;
 } hxSoilCurves;
 
-/* Normal forces and their derivatives, as in hxSoilForce. */
+/* Normal forces of soil and their derivatives. */
 typedef struct {
-  hxReal force, elastic, slope, stiffness, viscosity;
+  hxReal force;     /* N      f_n */
+  hxReal elastic;   /* N      its elastic part, on the virgin curve or the unloading line */
+  hxReal slope;     /* N/m    the elastic part by z */
+  hxReal stiffness; /* N/m    df_n/dz */
+  hxReal viscosity; /* N s/m  df_n/d(dz/dt) */
 } hxSoilForces;
 
 /* Returns which soils have a law. */
@@ -86,7 +92,7 @@ static inline hxSoilCurves mud(const hxSoils *soil, hxReal z) {
   return (hxSoilCurves){yield.force + hard.force, yield.slope + hard.slope};
 }
 
-/* Returns F_v(z) and its slope, as hx_soil_virgin does. */
+/* Returns F_v(z), the force of a first monotone loading, and its slope (eq. 40-43). */
 static inline hxSoilCurves hx_virgin(const hxSoils *soil, hxReal z) {
   const hxReal zero = hx_splat(0.0);
   const hxMask deep = hx_less(zero, z), is_bekker = deep & has_law(soil, HX_SOIL_BEKKER),
@@ -130,17 +136,20 @@ static inline hxSoilCurves contact_area(const hxSoils *soil, hxReal z) {
                        (hxSoilCurves){soil->area, zero});
 }
 
-/* Returns f_n and its derivatives, as hx_soil_normal_force does, with the virgin curve at z. */
+/* Returns f_n of feet at depth z that sink at dz, with the virgin curve at z (eq. 44, 45); 0 where
+ * z <= z_p. */
 static inline hxSoilForces hx_soil_forces(const hxSoils *soil, hxReal plastic, hxReal z, hxReal dz,
                                           hxSoilCurves virgin) {
   const hxReal zero = hx_splat(0.0);
   const hxMask touches = hx_less(plastic, z);
   if (!hx_any(touches)) return (hxSoilForces){zero, zero, zero, zero, zero};
-  const hxSoilCurves spring = elastic(soil, plastic, z, virgin), area = contact_area(soil, z);
+  const hxMask yields = hx_is_yielding(soil, plastic, z, dz, virgin.force);
+  const hxSoilCurves area = contact_area(soil, z);
+  hxSoilCurves spring = elastic(soil, plastic, z, virgin);
+  if (HX_HAS_SLOPES) spring = select_curves(yields, virgin, spring); /* for its derivative */
   const hxReal viscosity = soil->damping * area.force, force = spring.force + viscosity * dz;
   const hxMask pushes = touches & hx_less(zero, force);
-  const hxReal along =
-      hx_select(hx_is_yielding(soil, plastic, z, dz, virgin.force), virgin.slope, spring.slope);
+  const hxReal along = hx_select(yields, virgin.slope, spring.slope);
   return (hxSoilForces){.force = hx_select(pushes, force, zero),
                         .elastic = hx_select(touches, spring.force, zero),
                         .slope = hx_select(touches, along, zero),
@@ -162,44 +171,40 @@ static inline hxReal hx_stored_energy(const hxSoils *soil, hxReal plastic, hxRea
 
 /* Returns the half-turn angles of a pack. */
 static inline hxReal half_turn_angles(hxReal y, hxReal x) {
-  double a[HX_LANES], b[HX_LANES];
+  hxNumber a[HX_LANES], b[HX_LANES];
   hx_store(a, y), hx_store(b, x);
-  for (int lane = 0; lane < HX_LANES; ++lane) a[lane] = hx_half_turn_angle(a[lane], b[lane]);
+  for (int lane = 0; lane < HX_LANES; ++lane) a[lane] = hx_half_turn(a[lane], b[lane]);
   return hx_load(a);
 }
 
-/* Returns the integral of depth over the foot's profile, m3, and its slope, the profile's area. */
-static inline hxSoilCurves profile_moment(const hxSoils *soil, hxReal z) {
-  const hxReal zero = hx_splat(0.0), R = soil->radius, c = R - z;
-  const hxMask pad = hx_less(zero, soil->pad), part = ~pad & hx_less(-R, c);
-  const hxSoilCurves full = select_curves(pad, (hxSoilCurves){R * z * z, 2.0 * R * z},
-                                          (hxSoilCurves){pi * R * R * (z - R), pi * R * R});
+/* Returns the integral of depth over the foot's profile, m3. */
+static inline hxReal profile_moment(const hxSoils *soil, hxReal z) {
+  const hxReal R = soil->radius, c = R - z;
+  const hxMask pad = hx_less(hx_splat(0.0), soil->pad), part = ~pad & hx_less(-R, c);
+  const hxReal full = hx_select(pad, R * z * z, pi * R * R * (z - R));
   if (!hx_any(part)) return full;
   const hxReal chord = hx_sqrt((R - c) * (R + c));
   const hxReal segment = R * R * half_turn_angles(chord, c) - c * chord;
-  const hxReal force = (2.0 / 3.0) * (chord * chord * chord) - c * segment;
-  return select_curves(part, (hxSoilCurves){force, segment}, full);
+  return hx_select(part, (2.0 / 3.0) * (chord * chord * chord) - c * segment, full);
 }
 
-/* Returns the shear force that does not depend on the load, as hx_soil_shear_base does. */
-static inline hxSoilCurves hx_shear_base(const hxSoils *soil, hxReal z) {
-  const hxSoilCurves area = contact_area(soil, z);
+/* Returns the shear force that does not depend on the load (eq. 46): cohesion, and in granular
+ * media the resistance of the profile. */
+static inline hxReal hx_shear_base(const hxSoils *soil, hxReal z) {
   const hxMask is_granular = has_law(soil, HX_SOIL_GRANULAR);
-  hxSoilCurves base = {soil->cohesion * area.force, soil->cohesion * area.slope};
+  const hxReal base = soil->cohesion * contact_area(soil, z).force;
   if (!hx_any(is_granular)) return base;
-  const hxSoilCurves moment = profile_moment(soil, z);
-  return select_curves(is_granular,
-                       (hxSoilCurves){base.force + soil->ahead * moment.force,
-                                      base.slope + soil->ahead * moment.slope},
-                       base);
+  return hx_select(is_granular, base + soil->ahead * profile_moment(soil, z), base);
 }
 
 /* ---- both ---- */
 
-/* Forces on feet in contact with soil, as in hxSoilContact. */
+/* Forces on feet in contact with soil. */
 typedef struct {
   hxSoilForces normal;
-  hxSoilCurves held, stored, hold;
+  hxReal held;   /* N    times the sinking speed: power that is stored */
+  hxReal stored; /* J    energy that unloading gives back */
+  hxReal hold;   /* N/m  shear over the bristle without load */
 } hxSoilContacts;
 
 /* Returns the forces on feet at these depths and sinking speeds. */
@@ -210,14 +215,12 @@ static inline hxSoilContacts hx_soil_contacts(const hxSoils *soil, hxReal plasti
   /* the depth of shear does not fall below z_p: a foot that leaves the ground within a step keeps
    * its grip to the end of the step */
   const hxMask above = hx_less(z, plastic);
-  const hxSoilCurves base = hx_shear_base(soil, hx_select(above, plastic, z));
+  const hxReal base = hx_shear_base(soil, hx_select(above, plastic, z));
   const hxReal gains = hx_select(hx_less(zero, dz), f.slope / soil->unloading, hx_splat(1.0));
   return (hxSoilContacts){.normal = f,
-                          .held = {f.elastic * gains, f.slope * gains},
-                          .stored = {0.5 * f.elastic * f.elastic / soil->unloading,
-                                     f.elastic * f.slope / soil->unloading},
-                          .hold = {soil->per_displacement * base.force,
-                                   hx_select(above, zero, soil->per_displacement * base.slope)}};
+                          .held = f.elastic * gains,
+                          .stored = 0.5 * f.elastic * f.elastic / soil->unloading,
+                          .hold = soil->per_displacement * base};
 }
 
 #endif

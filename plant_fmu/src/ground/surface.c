@@ -5,8 +5,10 @@
 #include <string.h>
 
 #include "hexapod/message.h"
-#include "one_lane.h"
 #include "soil.h"
+
+#define HX_LANES 1
+#include "../lanes/lanes.h"
 
 #include "smooth.h" /* behind the numbers that it computes with */
 
@@ -495,30 +497,6 @@ void hx_terrain_face(const hxTerrain *terrain, hxFaceKind kind, const double cel
   if (kind == HX_FACE_SIDE || all) wall_faces(terrain, point, &at, 1, &nearest);
   if (kind == HX_FACE_CORNER || all) corner_faces(terrain, point, &at, &nearest);
   set_face(&nearest, bends, face);
-}
-
-/* ---- spheres above the ground ---- */
-
-double hx_terrain_top_around(const hxTerrain *terrain, const double centre[3]) {
-  const hxGridHead *head = &terrain->head;
-  const double x = (centre[0] - head->x0) * terrain->per_cell,
-               y = (centre[1] - head->y0) * terrain->per_cell,
-               reach = HX_LEAST_REACH * terrain->per_cell;
-  const double ends[4] = {x - reach, x + reach, y - reach, y + reach};
-  return hx_terrain_top_between(terrain, ends);
-}
-
-double hx_terrain_depth_bound(const hxTerrain *terrain, const double centre[3], double radius) {
-  const hxGridHead *head = &terrain->head;
-  if (hx_has_large_blocks(terrain) && radius < 0.9 * least_reach) {
-    const double above = centre[2] - hx_terrain_top_around(terrain, centre);
-    return radius - (above < least_reach ? above : least_reach);
-  }
-  if (!(radius < terrain->reach)) return radius; /* unknown: the tile's map does not reach so far */
-  const int64_t col = hx_cell_index((centre[0] - head->x0) * terrain->per_tile, terrain->tile_cols);
-  const int64_t row = hx_cell_index((centre[1] - head->y0) * terrain->per_tile, terrain->tile_rows);
-  const double above = centre[2] - terrain->top[row * terrain->tile_cols + col];
-  return radius - (above < terrain->reach ? above : terrain->reach);
 }
 
 /* ---- materials ---- */

@@ -108,18 +108,10 @@ void hx_terrain_face(const hxTerrain *terrain, hxFaceKind kind, const double cel
 /* Copies the 4 x 4 nodes around a patch; nodes beyond the grid continue it linearly. */
 void hx_terrain_border_nodes(const hxTerrain *terrain, int64_t row, int64_t col, double out[4][4]);
 
-/* Returns the height of the highest block within 20 mm along x and y, which are few blocks where
- * spheres as small as feet walk. */
-double hx_terrain_top_around(const hxTerrain *terrain, const double centre[3]);
-
 /* Returns whether the blocks are so large that few of them are within the least reach. */
 static inline int hx_has_large_blocks(const hxTerrain *terrain) {
   return terrain->head.kind == HX_SURFACE_BLOCKS && terrain->head.cell >= HX_LEAST_REACH;
 }
-
-/* Returns an upper bound of a sphere's depth in the ground, m; negative: it does not touch. The
- * bound is cheap: a look-up of the highest ground around the sphere. */
-double hx_terrain_depth_bound(const hxTerrain *terrain, const double centre[3], double radius);
 
 /* Returns the least shear displacement of the table's soils, m; 0 if no material is soil. */
 double hx_terrain_shear_displacement(const hxTerrain *terrain);

@@ -35,7 +35,7 @@ typedef struct {
 static inline hxPower hx_power_of(const hxCommand *command, int joint, int slot) {
   const hxReal supply = hx_splat(command->supply);
   return (hxPower){supply, supply * hx_load(&command->duty[joint][slot]),
-                   hx_load(&command->strength[joint][slot])};
+                   1.0 - hx_load(&command->weakness[joint][slot])};
 }
 
 /* Returns the torque and the limits of a motor whose voltage is limited (eq. 48). The back-EMF
@@ -94,16 +94,9 @@ static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal
 
 /* Returns exp(-|speed/w_s|^a), the share of the Stribeck terms (eq. 50). */
 static inline hxReal stribeck_share(const hxModel *model, hxReal speed) {
-#ifdef HX_TANGENT
-  const double w = hx_re(speed), a = hx_re(model->stribeck_exponent),
-               power = hx_pow(fabs(w) * hx_re(model->per_stribeck_speed), a),
-               share = 1.0 + expm1(-power); /* the C library's exp is too new a version */
-  return hx_chain(speed, share, w != 0.0 ? -share * power * a / w : 0.0);
-#else
   const hxReal power =
       hx_lanes_pow(hx_abs(speed) * model->per_stribeck_speed, hx_splat(model->stribeck_exponent));
   return 1.0 + hx_expm1(-hx_min(power, hx_splat(40.0)));
-#endif
 }
 
 /* Returns the quadratic term of eq. 50, where the external torque opposes the motor's. */

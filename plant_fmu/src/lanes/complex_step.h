@@ -50,6 +50,8 @@ static inline hxReal hx_chain(hxReal x, double value, double slope) {
   return hx_complex(value, slope * hx_im(x));
 }
 
+static inline int hx_any(hxMask mask) { return mask != 0; }
+
 /* The slope at 0 is set to 0, because all arguments of roots are squares. */
 static inline hxReal hx_sqrt(hxReal x) {
   const double root = sqrt(fmax(hx_re(x), 0.0));
@@ -77,6 +79,19 @@ static inline hxNumber hx_atan2(hxNumber y, hxNumber x) {
 static inline hxNumber hx_asin(hxNumber x) {
   const double s = fmin(1.0, fmax(-1.0, hx_re(x))), cosine = sqrt(1.0 - s * s);
   return hx_chain(x, asin(s), cosine > 0.0 ? 1.0 / cosine : 0.0);
+}
+
+/* Returns the angle in [0, pi] with sine y and cosine x, as hx_half_turn_angle does. */
+static inline hxNumber hx_half_turn(hxNumber y, hxNumber x) { return hx_atan2(y, x); }
+
+static inline hxReal hx_lanes_pow(hxReal x, hxReal y) {
+  const double power = hx_pow(hx_re(x), hx_re(y));
+  return hx_chain(x, power, hx_re(x) > 0.0 ? hx_re(y) * power / hx_re(x) : 0.0);
+}
+
+static inline hxReal hx_expm1(hxReal x) {
+  const double e = expm1(hx_re(x));
+  return hx_chain(x, e, 1.0 + e);
 }
 
 static inline hxReal hx_angle_from_half(hxReal y, hxReal x) {

@@ -55,7 +55,7 @@ typedef struct {
 /* Returns whether the friction of a row's contacts on rigid ground has bristles; others slide by
  * the tanh law then. */
 static inline int has_friction_bristles(const hxModel *model, int row) {
-  return row == HX_FOOT && hx_is_bristle_law(model->friction_law);
+  return row == HX_FOOT && hx_friction_kind(model->friction_law).has_bristles;
 }
 
 /* Returns whether the contacts of a row stand on bristles, those of friction or of soil. */
@@ -151,35 +151,28 @@ HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, 
                                  .yield = hx_select(soft, yield, rigid.yield)};
 }
 
-typedef struct hxMergedFeet hxMergedFeet;
-
 /* What is known of contacts before they are computed; NULL: nothing. */
 typedef struct {
   const hxMoment *moment;     /* of the same motion: angles, and places of all contacts on a grid */
   hxPatchNodes *nodes;        /* around the feet of an earlier motion, pack by pack */
   const hxSoilCurves *virgin; /* under the feet at the same depths, pack by pack */
-  const hxMergedFeet *merged; /* the feet's contacts in one row, pack by pack */
 } hxKnown;
 
+/* Return what is known of a pack of a row; NULL: nothing. Points of numbers with derivatives are
+ * computed one by one. */
 #ifdef HX_TANGENT
-/* Points of numbers with derivatives are computed one by one. */
 static inline hxPatchNodes *known_nodes(const hxKnown *known, int row, int slot) {
-  (void)known, (void)row, (void)slot;
-  return NULL;
-}
-static inline const hxSoilCurves *known_virgin(const hxKnown *known, int row, int slot) {
   (void)known, (void)row, (void)slot;
   return NULL;
 }
 #else
-/* Returns what is known of a pack of a row; NULL: nothing. */
 static inline hxPatchNodes *known_nodes(const hxKnown *known, int row, int slot) {
   return known && known->nodes && row < HX_FOOT_ROWS ? &known->nodes[slot / HX_LANES] : NULL;
 }
+#endif
 static inline const hxSoilCurves *known_virgin(const hxKnown *known, int row, int slot) {
   return known && known->virgin && row == HX_FOOT ? &known->virgin[slot / HX_LANES] : NULL;
 }
-#endif
 
 /* Returns distance and normal of a grid at a row's points from the moment of the same motion. */
 HX_INLINE hxGround known_ground(const hxModel *model, const hxMoment *moment, int row, int slot) {
@@ -303,50 +296,6 @@ HX_INLINE void hx_contact_force(const hxModel *model, const hxContactState *stat
   else
     replace_body_by_soil(model, state, row, slot, contact);
 }
-
-#ifndef HX_TANGENT
-/* While some feet stand on tops and others at walls, edges or corners, an evaluation computes a row
- * of contacts for each of these faces, in which most lanes have no contact. If no foot has two, the
- * lanes of one row are enough. Their numbers are those of the rows, to the last bit. */
-
-/* Contacts of a pack of feet; those of no contact are the first row's. */
-struct hxMergedFeet {
-  hxMask on[HX_FOOT_ROWS]; /* lanes whose contact is of a row */
-  int used[HX_FOOT_ROWS];  /* 1: there are some */
-  hxContactLawAt law;
-  hxFrictionAt friction;
-};
-
-/* Returns distance and normal of the faces that feet touch. */
-static inline hxGround merged_ground(const hxModel *model, const hxContactState *state,
-                                     const hxKnown *known, int slot, const hxMergedFeet *merged,
-                                     hxVec3 point) {
-  hxGround ground;
-  for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) {
-    if (row != HX_FOOT && !merged->used[row]) continue;
-    const hxGround of_row = hx_known_or_searched(model, state, known, row, slot, HX_CLOSED, point);
-    const hxMask on = merged->on[row];
-    ground = row == HX_FOOT ? of_row
-                            : (hxGround){hx_select(on, of_row.distance, ground.distance),
-                                         select3(on, of_row.normal, ground.normal)};
-  }
-  return ground;
-}
-
-/* Computes kinematics, law and force of the feet's only contacts, as those of the first row. */
-HX_RARE void hx_merged_contact(const hxModel *model, const hxContactState *state,
-                               const hxPlantMotion *motion, const hxKnown *known, int slot,
-                               const hxBody *tibia, hxContactWork *contact) {
-  const hxMergedFeet *merged = &known->merged[slot / HX_LANES];
-  const hxVec3 r = hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
-               v = hx_link_vec3(motion, HX_JOINTS - 1, HX_V, slot),
-               to_centre = hx_mul(tibia->R_WB, hx_load_vec3(model->point[HX_FOOT], slot));
-  const hxGround ground = merged_ground(model, state, known, slot, merged, hx_add3(r, to_centre));
-  contact->kin = hx_kinematics_over(&ground, model->radius[HX_FOOT], to_centre, v, tibia);
-  contact->law = merged->law;
-  rigid_force(model, HX_FOOT, slot, motion, merged->friction, contact);
-}
-#endif
 
 /* Computes the moment of spin and rolling friction on bodies that turn at w; the normal forces are
  * known. */

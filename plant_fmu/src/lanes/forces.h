@@ -295,29 +295,11 @@ HX_RARE void push_further(const hxModel *model, const hxContactState *state,
   for (int k = 1; k < leg->rows; ++k) push_leg(model, state, motion, NULL, leg->row[k], slot, leg);
 }
 
-#ifndef HX_TANGENT
-/* Computes the forces of the feet's only contacts and applies them. */
-HX_RARE void merged_leg_contact(const hxModel *model, const hxContactState *state,
-                                const hxPlantMotion *motion, const hxKnown *known, int slot,
-                                hxLegWork *leg) {
-  hxJointWork *tibia = &leg->joint[HX_JOINTS - 1];
-  hxContactWork *contact = &leg->contact[HX_FOOT];
-  hx_merged_contact(model, state, motion, known, slot, &tibia->body, contact);
-  push_body(&tibia->p, contact_point(leg, contact), contact->force);
-}
-#endif
-
 /* Computes the contact forces of a leg; without all, only those of rows with closed contacts. */
 static inline void leg_contacts(const hxModel *model, const hxContactState *state,
                                 const hxPlantMotion *motion, const hxKnown *known, int slot,
                                 int all, hxLegWork *leg) {
   leg->rows = 1, leg->row[0] = HX_FOOT;
-#ifndef HX_TANGENT
-  if (known && known->merged) {
-    merged_leg_contact(model, state, motion, known, slot, leg);
-    return;
-  }
-#endif
   leg_contact(model, state, motion, known, HX_FOOT, slot, all, leg);
   if (model->rows > 1) further_contacts(model, state, motion, known, slot, all, leg);
   push_leg(model, state, motion, known, HX_FOOT, slot, leg);

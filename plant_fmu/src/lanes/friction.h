@@ -44,9 +44,15 @@ HX_INLINE hxReal hx_per_speed(const hxModel *model, hxReal speed) {
                                   hx_tanh_ratio(hx_select(slow, hx_splat(1.0), x)));
 }
 
-/* Returns g of f_t = -mu f_n g(|v_t|) v_t (eq. 15). */
+/* Returns g of f_t = -mu f_n g(|v_t|) v_t (eq. 15). A further law without bristles needs here its
+ * function above and a case. */
 HX_INLINE hxReal hx_friction(const hxModel *model, hxReal speed) {
-  return model->friction_law == HX_FRICTION_NONE ? hx_splat(0.0) : hx_per_speed(model, speed);
+  switch (model->friction_law) {
+  case HX_FRICTION_NONE:
+    return hx_splat(0.0);
+  default:
+    return hx_per_speed(model, speed);
+  }
 }
 
 /* Returns the tanh law's tangential force over load and slip speed, s/m (eq. 15, 35):

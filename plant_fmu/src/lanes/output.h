@@ -325,8 +325,9 @@ static void fill_energy(const hxModel *model, const hxState *state, const hxWork
   o->energy.contact_loss = state->measured.contact_loss;
   o->energy.friction_loss = state->measured.friction_loss;
   o->energy.gear_loss = state->measured.gear_loss;
+  o->energy.parameter_work = state->parameter_work;
   o->energy.residual = o->energy.kinetic + o->energy.potential - state->stored_at_start -
-                       m->actuator_work - m->push_work + m->dissipated;
+                       m->actuator_work - m->push_work + m->dissipated - state->parameter_work;
 }
 
 /* Fills the outputs of all joints that belong to the groups. */

@@ -1,16 +1,13 @@
-/* soil_pack.h - soil under packs of contacts: forces on lanes from the scalar functions of soil.h
+/* soil_pack.h - soil under packs of contacts: forces on lanes by soil_law.h
  *
  * The functions are out of line, so that rigid ground costs the same with and without them.
  */
 #ifndef HX_SOIL_PACK_H
 #define HX_SOIL_PACK_H
 
-#include "../ground/soil.h"
 #include "lanes.h"
 
-#ifndef HX_TANGENT
 #include "../ground/soil_law.h" /* behind lanes.h */
-#endif
 
 _Static_assert(sizeof(hxSoil) == HX_SOIL_SIZE * sizeof(double), "a soil consists of numbers");
 
@@ -50,40 +47,11 @@ typedef struct {
   hxReal shear;                /* N      T_max */
 } hxSoilPack;
 
-#ifdef HX_TANGENT
-typedef struct hxSoilCurves hxSoilCurves;
-
-/* Returns the forces on a row at these depths and sinking speeds. */
-HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int row, int slot, hxReal delta,
-                                hxReal ddelta, const hxSoilCurves *virgin) {
-  const hxReal none = hx_splat(0.0);
-  (void)virgin;
-  if (!is_in_soil(state, row, slot))
-    return (hxSoilPack){none, none, none, none, none, none, none, none, none};
-  const hxSoil soil = hx_soil_under(state, row, slot);
-  const hxSoilContact f = hx_soil_contact(&soil, hx_re(state->plastic[hx_soil_row(row)][slot]),
-                                          hx_re(delta), hx_re(ddelta));
-  const hxSoilForce *n = &f.normal;
-  const hxReal force =
-      hx_with_slope(n->force, n->stiffness * hx_slope(delta) + n->viscosity * hx_slope(ddelta));
-  return (hxSoilPack){.force = force,
-                      .stiffness = n->stiffness,
-                      .viscosity = n->viscosity,
-                      .held = hx_chain(delta, f.held.force, f.held.slope),
-                      .stored = hx_chain(delta, f.stored.force, f.stored.slope),
-                      .hold = hx_chain(delta, f.hold.force, f.hold.slope),
-                      .per_load = soil.friction * soil.per_displacement,
-                      .per_displacement = soil.per_displacement,
-                      .shear =
-                          soil.friction * force + (1.0 / soil.per_displacement) *
-                                                      hx_chain(delta, f.hold.force, f.hold.slope)};
-}
-#else
 /* Returns the soils on which the contacts of a row touched down. */
 static inline hxSoils hx_soils_under(const hxContactState *state, int row, int slot) {
   hxSoils soils;
   hxReal numbers[HX_SOIL_SIZE];
-  const double (*of_row)[HX_SLOTS] = state->soil[hx_soil_row(row)];
+  const hxNumber(*of_row)[HX_SLOTS] = state->soil[hx_soil_row(row)];
   for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_load(&of_row[i][slot]);
   memcpy(&soils, numbers, sizeof soils);
   return soils;
@@ -109,14 +77,13 @@ HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int row, int slot, 
       .force = hx_select(in, f.normal.force, none),
       .stiffness = hx_select(in, f.normal.stiffness, none),
       .viscosity = hx_select(in, f.normal.viscosity, none),
-      .held = hx_select(in, f.held.force, none),
-      .stored = hx_select(in, f.stored.force, none),
-      .hold = hx_select(in, f.hold.force, none),
+      .held = hx_select(in, f.held, none),
+      .stored = hx_select(in, f.stored, none),
+      .hold = hx_select(in, f.hold, none),
       .per_load = hx_select(in, soil.friction * soil.per_displacement, none),
       .per_displacement = hx_select(in, soil.per_displacement, none),
-      .shear = hx_select(in, soil.friction * f.normal.force + f.hold.force / soil.per_displacement,
-                         none)};
+      .shear =
+          hx_select(in, soil.friction * f.normal.force + f.hold / soil.per_displacement, none)};
 }
-#endif
 
 #endif

@@ -208,8 +208,6 @@ static inline hxStepEnd end_step(const hxModel *model, const hxPlantMotion *from
   switch (m->stages) {
   case 2:
     return step_of_n(model, from, h, m, 2, estimates, k, y);
-  case 3:
-    return step_of_n(model, from, h, m, 3, estimates, k, y);
   case 4:
     return step_of_n(model, from, h, m, 4, estimates, k, y);
   default:
@@ -281,65 +279,6 @@ static const hxCommand *command_at(const hxStart *start, double t, hxCommand *no
   return now;
 }
 
-/* Returns a row's constants in the lanes of the mask, and those before elsewhere. */
-static inline void merge_row(const hxContactState *state, int row, int slot, hxMergedFeet *merged) {
-  const hxMask on = merged->on[row];
-  const hxContactLawAt law = hx_law_at(state, row, slot);
-  const hxFrictionAt friction = hx_friction_at(state, row, slot);
-  merged->law = (hxContactLawAt){hx_select(on, law.closed, merged->law.closed),
-                                 hx_select(on, law.damping, merged->law.damping),
-                                 hx_select(on, law.stiffness, merged->law.stiffness)};
-  merged->friction =
-      (hxFrictionAt){hx_select(on, friction.mu, merged->friction.mu),
-                     hx_select(on, friction.static_rise, merged->friction.static_rise)};
-}
-
-/* Merges the rows of a pack of feet. Returns 0 where a foot has several contacts. */
-static inline int merge_pack(const hxContactState *state, int slot, hxMergedFeet *merged) {
-  const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
-  hxReal closed = zero;
-  for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) {
-    const hxReal of_row = hx_load(&state->closed[row][slot]);
-    merged->on[row] = hx_less(zero, of_row);
-    merged->used[row] = hx_any(merged->on[row]);
-    closed += of_row;
-  }
-  if (hx_any(hx_less(one, closed))) return 0;
-  merged->law = hx_law_at(state, HX_FOOT, slot);
-  merged->friction = hx_friction_at(state, HX_FOOT, slot);
-  for (int row = HX_FOOT + 1; row < HX_FOOT_ROWS; ++row)
-    if (merged->used[row]) merge_row(state, row, slot, merged);
-  return 1;
-}
-
-/* Merges the rows of the feet. Returns 0 where they have to stay apart, or where the first row has
- * all contacts: bristles and soil are of that row alone. */
-HX_RARE int hx_merge_feet(const hxModel *model, const hxContactState *state,
-                          hxMergedFeet merged[HX_PACKS]) {
-  int further = 0;
-  if (model->rows > model->foot_rows || has_bristles(model, HX_FOOT) ||
-      has_turning_friction(model, HX_FOOT))
-    return 0;
-  for (int pack = 0; pack < HX_PACKS; ++pack) {
-    if (!merge_pack(state, pack * HX_LANES, &merged[pack])) return 0;
-    for (int row = HX_FOOT + 1; row < HX_FOOT_ROWS; ++row) further |= merged[pack].used[row];
-  }
-  return further;
-}
-
-/* Copies a step's impulses of merged contacts to their rows. */
-HX_RARE void hx_part_impulses(const hxMergedFeet merged[HX_PACKS], hxVec3 sum[][HX_PACKS]) {
-  const hxVec3 none = hx_zero3();
-  for (int pack = 0; pack < HX_PACKS; ++pack) {
-    hxVec3 first = sum[HX_FOOT][pack];
-    for (int row = HX_FOOT + 1; row < HX_FOOT_ROWS; ++row) {
-      sum[row][pack] = select3(merged[pack].on[row], sum[HX_FOOT][pack], none);
-      first = select3(merged[pack].on[row], none, first);
-    }
-    sum[HX_FOOT][pack] = first;
-  }
-}
-
 /* Computes one step of the method and its error; the state changes only in its counters. */
 static void try_step(const hxStart *start, double h, hxState *state, hxTrial *trial) {
   const hxMethodRow *m = start->method;
@@ -351,8 +290,6 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
   hxCommand now;
   implicit->z = h * m->gamma, implicit->ahead = h;
   implicit->change = NULL; /* the first stage sets all slopes that later stages read */
-  hxMergedFeet merged[HX_PACKS];
-  const int is_merged = model->foot_rows > 1 && hx_merge_feet(model, start->contact, merged);
   hx_clear_impulses(model, &trial->impulses);
   /* stages: y_i = y_0 + sum a_ij k_j, k_i by eq. 19 */
   for (int i = 0; i < m->stages; ++i) {
@@ -366,16 +303,14 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     hxImplicit *stage = m->gamma > 0.0 ? implicit : NULL;
     const hxKnown known = {i > 0 ? NULL : &state->moment, start->scratch->nodes,
                            i == 0 && start->scratch->is_soil_known ? start->scratch->soil.from
-                                                                   : NULL,
-                           is_merged ? merged : NULL};
+                                                                   : NULL};
     hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? y : start->y, &known, stage, 0,
                          work, &k[i]);
     hx_add_impulses(model, command, stage, work, h * m->b[i], &trial->impulses);
     state->evaluations += 1.0;
   }
-  if (is_merged) hx_part_impulses(merged, trial->impulses.contact);
   /* y_1 = y_0 + sum b_i k_i, error = |sum e_i k_i| */
-  const int estimates = m->error_order > 0 && model->step == 0.0;
+  const int estimates = model->step == 0.0;
   hxStepEnd end = end_step(model, start->y, h, m, estimates, k, &trial->y);
   trial->error = estimates ? error_norm(model, &end) : 0.0;
   trial->y.actuator_work =

@@ -231,7 +231,7 @@ static inline hxReal hx_cone_place(hxReal share) {
 }
 
 static inline int hx_has_cone(const hxModel *model) {
-  return (model->mu > 0.0 && model->friction_law != HX_FRICTION_NONE) || model->has_soil;
+  return (model->mu > 0.0 && hx_friction_kind(model->friction_law).has_friction) || model->has_soil;
 }
 
 /* Returns the largest impulse of friction, on soil of shear (eq. 46), under a normal impulse. */
@@ -242,7 +242,7 @@ HX_RARE hxReal cone_with_soil(const hxPath *path, int slot, hxReal along, hxReal
                to = hx_load(&path->to->contact[HX_FOOT].delta[slot]);
   const hxSoils soil = hx_soils_under(path->contact, HX_FOOT, slot);
   const hxReal z = hx_max(0.5 * (from + to), hx_splat(0.0));
-  return hx_select(in, soil.friction * along + path->h * hx_shear_base(&soil, z).force, rigid);
+  return hx_select(in, soil.friction * along + path->h * hx_shear_base(&soil, z), rigid);
 }
 
 HX_INLINE hxReal cone(const hxPath *path, int row, int slot, hxReal along) {

@@ -34,73 +34,11 @@ HX_INLINE void row_moment(const hxModel *model, const hxContactState *state,
                        tibia->w, &moment->contact[row]);
 }
 
-/* Contacts whose place on a grid is computed, of a pack of feet: with the ground below them, and
- * with walls beside them; of the tibia's other points. */
-typedef struct {
-  int below, beside, others;
-} hxSearch;
-
-/* Stores a row of walls that no foot touches: its face is far above the level one below the feet,
- * so that all but the depth is that of the feet's first row. */
-static inline void far_row_moment(const hxModel *model, int row, int slot, hxMoment *moment) {
-  const double *from = (const double *)&moment->contact[HX_FOOT];
-  double *to = (double *)&moment->contact[row];
-  for (int line = 0; line < HX_CONTACT_LINES; ++line)
-    hx_store(&to[line * HX_SLOTS + slot], hx_load(&from[line * HX_SLOTS + slot]));
-  hx_store(&moment->contact[row].delta[slot], hx_splat(model->radius[row] - hx_far));
-}
-
 HX_RARE void further_moments(const hxModel *model, const hxContactState *state,
-                             const hxPlantMotion *motion, const hxKnown *known, int slot,
-                             const hxSearch *search, const hxBody *tibia, hxMoment *moment) {
-  for (int k = 1; k < model->rows; ++k) {
-    const int row = model->row[k], is_of_foot = hx_is_of_foot(row);
-    if (is_of_foot && search->beside == HX_CLOSED && !is_used(state, row, slot))
-      far_row_moment(model, row, slot, moment);
-    else
-      row_moment(model, state, motion, known, row, slot,
-                 is_of_foot ? search->beside : search->others, tibia, moment);
-  }
-}
-
-/* Returns whether a place, in cells from a cell's corner, is not over the cell. */
-static inline int is_off_cell(double x, double y) {
-  return x < 0.0 || x > 1.0 || y < 0.0 || y > 1.0;
-}
-
-/* Leaves out the search of contacts that feet on blocks certainly do not have: those of open feet
- * that are higher than the ground around them, and walls where no block around a foot is higher
- * than that on which it stands. */
-HX_RARE void search_near_blocks(const hxModel *model, const hxContactState *state, int slot,
-                                const hxVec3 *centre, hxSearch *search) {
-  const hxTerrain *terrain = model->terrain;
-  const double per_cell = terrain->per_cell, reach = HX_LEAST_REACH * per_cell;
-  const hxReal x = (centre->x - terrain->head.x0) * per_cell,
-               y = (centre->y - terrain->head.y0) * per_cell;
-  double low[2][HX_LANES], high[2][HX_LANES], z[HX_LANES];
-  if (!(model->radius[HX_FOOT] < 0.9 * HX_LEAST_REACH && terrain->head.cell >= HX_LEAST_REACH))
-    return;
-  hx_store(low[0], x - reach), hx_store(high[0], x + reach);
-  hx_store(low[1], y - reach), hx_store(high[1], y + reach);
-  hx_store(z, centre->z - model->ground_point[2]);
-  int below = 0, beside = 0;
-  /* slots past the last leg are those of leg 0: in a pack with it they are listed by its bit */
-  for (int lane = 0; lane < HX_LANES && (slot > 0 || lane < HX_LEGS); ++lane) {
-    const double ends[4] = {low[0][lane], high[0][lane], low[1][lane], high[1][lane]};
-    const double around = hx_terrain_top_between(terrain, ends), col = state->cell[0][slot + lane];
-    const int is_held = col >= 0.0; /* a foot may have left its block in its print */
-    const double own =
-        is_held ? hx_terrain_column(terrain, col, state->cell[1][slot + lane])
-                : hx_terrain_column(terrain, 0.5 * (ends[0] + ends[1]), 0.5 * (ends[2] + ends[3]));
-    if (z[lane] - hx_higher_of(around, own) >= HX_LEAST_REACH) continue;
-    below |= (state->closed[HX_FOOT][slot + lane] == 0.0) << lane;
-    /* the walls of a block go on beside it for a foot that was dragged off it */
-    const int is_off =
-        model->has_soil &&
-        is_off_cell(low[0][lane] + reach - col, low[1][lane] + reach - state->cell[1][slot + lane]);
-    beside |= (model->has_soil && !is_held) || around > own || is_off ? 1 << lane : 0;
-  }
-  search->below = hx_listed(below), search->beside = hx_listed(beside);
+                             const hxPlantMotion *motion, const hxKnown *known, int slot, int all,
+                             const hxBody *tibia, hxMoment *moment) {
+  for (int k = 1; k < model->rows; ++k)
+    row_moment(model, state, motion, known, model->row[k], slot, all, tibia, moment);
 }
 
 /* Returns the depths of a row of contacts of bodies with centres of mass r, on a grid at most. */
@@ -215,14 +153,8 @@ static inline double hx_moment_and_bound(const hxModel *model, const hxModel *wh
       hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub3(j.w, i.w)));
     }
     hx_store_vec3(moment->turn, slot, j.w);
-    hxSearch search = {all, all, all};
-    if (all == HX_NEAR && model->foot_rows > 1) {
-      const hxVec3 centre = hx_add3(hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
-                                    hx_mul(j.R_WB, hx_load_vec3(model->point[HX_FOOT], slot)));
-      search_near_blocks(model, state, slot, &centre, &search);
-    }
-    row_moment(model, state, motion, &known, HX_FOOT, slot, search.below, &j, moment);
-    if (model->rows > 1) further_moments(model, state, motion, &known, slot, &search, &j, moment);
+    row_moment(model, state, motion, &known, HX_FOOT, slot, all, &j, moment);
+    if (model->rows > 1) further_moments(model, state, motion, &known, slot, all, &j, moment);
     if (whole) bound = tibia_depth_bound(whole, motion, slot, &j.R_WB, bound);
   }
   if (model->foot_rows > 1) hx_moment_shares(model, state, moment);

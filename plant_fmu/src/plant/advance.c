@@ -111,9 +111,8 @@ static hxStatus advance_part(hxPlant *plant, const hxStepCall *call, double t_en
   memset(&ramp, 0, sizeof ramp);
   if (call->ramp) ramp = *call->ramp;
   const double end = part_command(plant, call, resumes, t_end, &command, &ramp);
-  const hxStatus status =
-      hx_kernel()->integrate(&plant->model, &command, moves ? &ramp : NULL, end, events, state,
-                             plant->scratch, plant->message);
+  const hxStatus status = hx_kernel()->integrate(&plant->model, &command, moves ? &ramp : NULL, end,
+                                                 events, state, plant->scratch, plant->message);
   hx_count_overload(&command, &plant->model, state, state->time - begin);
   const int interrupted = state->time < end;
   state->call_input = interrupted ? call->fingerprint : 0.0;

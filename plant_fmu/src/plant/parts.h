@@ -28,8 +28,7 @@ hxStatus hx_plant_check_terrain(hxPlant *plant, const hxDefinition *d, char *mes
 
 /* Fails if feet, torso, knees, shanks, or lines of two legs, start so deep in the ground or in each
  * other that the contact law does not hold. The kernel has started the state. */
-hxStatus hx_plant_check_start(const hxPlant *plant, const hxDefinition *d,
-                              char message[HX_MESSAGE_SIZE]);
+hxStatus hx_plant_check_start(const hxPlant *plant, char message[HX_MESSAGE_SIZE]);
 
 HX_HIDDEN_END
 

@@ -1,7 +1,6 @@
 #include <math.h>
 
 #include "../contact_law.h"
-#include "../ground/soil.h"
 #include "../ground/surface.h"
 #include "../kernel.h"
 #include "../robot/robot.h"
@@ -32,38 +31,14 @@ hxStatus hx_plant_check_terrain(hxPlant *plant, const hxDefinition *d, char *mes
 typedef struct {
   int row, slot;
   double depth, bound; /* m  of its lowest point, largest one that is accepted */
-  int is_in_soil;
 } hxSunk;
 
-/* Returns the depth at which soil carries a load, m, between two depths. */
-static double depth_of_load(const hxSoil *soil, double load, double low, double high) {
-  for (int i = 0; i < 100; ++i) {
-    const double middle = 0.5 * (low + high);
-    if (hx_soil_virgin(soil, middle).force <= load)
-      low = middle;
-    else
-      high = middle;
-  }
-  return low;
-}
-
 /* Returns how deep a sphere is in the ground, and how deep it may be: its radius, where its centre
- * reaches the surface, or in soil the depth at which the soil carries the robot's weight on it
- * alone, if that is deeper. Points have the bound of feet, because the force that the law has at a
- * depth is the same. */
-static hxSunk sunk(const hxModel *model, const hxContactState *contact, const hxDepths *depths,
-                   double weight, int row, int slot) {
+ * reaches the surface. Points have the bound of feet, because the force that the law has at a depth
+ * is the same. */
+static hxSunk sunk(const hxModel *model, const hxDepths *depths, int row, int slot) {
   const double radius = model->radius[row] > 0.0 ? model->radius[row] : model->radius[HX_FOOT];
-  const int soft = hx_soil_row(row), is_in_soil = contact->on_soil[soft][slot] != 0.0;
-  hxSunk sphere = {row, slot, depths->delta[row][slot] + contact->plastic[soft][slot], radius, 0};
-  if (sphere.depth <= radius || !is_in_soil) return sphere;
-  const hxSoil soil = hx_contact_soil(contact, row, slot);
-  if (hx_soil_virgin(&soil, radius).force > weight) return sphere;
-  sphere.is_in_soil = 1;
-  sphere.bound = hx_soil_virgin(&soil, sphere.depth).force <= weight
-                     ? sphere.depth
-                     : depth_of_load(&soil, weight, radius, sphere.depth);
-  return sphere;
+  return (hxSunk){row, slot, depths->delta[row][slot], radius};
 }
 
 /* Writes the name of a sphere. */
@@ -77,9 +52,9 @@ static void name_sphere(const hxSunk *sphere, char name[32]) {
     hx_print(name, 32, "%s %s", row[sphere->row], hx_leg_name(slot));
 }
 
-/* Fails if a foot, a knee, a shank or a corner of the torso starts deeper in the ground than it
+/* Fails if a foot, a knee, a shank or a corner of the torso starts deeper in rigid ground than it
  * may: the contact law does not hold at such depths, and its force would throw the robot up. */
-static hxStatus check_start_depth(const hxPlant *plant, const hxDepths *depths, double weight,
+static hxStatus check_start_depth(const hxPlant *plant, const hxDepths *depths,
                                   char message[HX_MESSAGE_SIZE]) {
   const hxModel *model = &plant->model;
   const hxContactState *contact = &plant->state.contact;
@@ -87,13 +62,14 @@ static hxStatus check_start_depth(const hxPlant *plant, const hxDepths *depths, 
   char name[32];
   for (int k = 0; k < model->listed; ++k)
     for (int slot = 0; hx_may_sink(model->row[k]) && slot < hx_slots_of(model->row[k]); ++slot) {
-      const hxSunk sphere = sunk(model, contact, depths, weight, model->row[k], slot);
-      if (sphere.depth - sphere.bound > worst.depth - worst.bound) worst = sphere;
+      const hxSunk sphere = sunk(model, depths, model->row[k], slot);
+      if (contact->on_soil[hx_soil_row(model->row[k])][slot] == 0.0 &&
+          sphere.depth - sphere.bound > worst.depth - worst.bound)
+        worst = sphere;
     }
   if (!(worst.depth > worst.bound)) return HX_OK;
   name_sphere(&worst, name);
   const char *reason = model->radius[worst.row] > 0.0 ? "its radius" : "the radius of a foot";
-  if (worst.is_in_soil) reason = "where the soil carries the robot's weight on it";
   hx_print(message, HX_MESSAGE_SIZE,
            "initial.position: got %s %.4g m deep in the ground, expected at most %.4g m, %s; raise "
            "initial.position[3] by %.4g m or more, or lower terrain.height",
@@ -121,10 +97,9 @@ static hxStatus check_start_overlap(const hxModel *model, const hxDepths *depths
   return HX_OK;
 }
 
-hxStatus hx_plant_check_start(const hxPlant *plant, const hxDefinition *d,
-                              char message[HX_MESSAGE_SIZE]) {
+hxStatus hx_plant_check_start(const hxPlant *plant, char message[HX_MESSAGE_SIZE]) {
   hxDepths depths;
   hx_kernel()->depths(&plant->model, &plant->state.contact, &plant->state.motion, &depths);
-  const hxStatus status = check_start_depth(plant, &depths, hx_weight(d), message);
+  const hxStatus status = check_start_depth(plant, &depths, message);
   return status == HX_OK ? check_start_overlap(&plant->model, &depths, message) : status;
 }

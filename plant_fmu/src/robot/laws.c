@@ -20,7 +20,7 @@ double hx_weight(const hxDefinition *d) {
 
 /* Copies friction and its choices. Feet without friction resist neither spin nor rolling. */
 static void compile_friction(hxModel *model, const hxDefinition *d) {
-  const int rubs = d->friction.law != HX_FRICTION_NONE;
+  const int rubs = hx_friction_kind(d->friction.law).has_friction;
   model->friction_law = d->friction.law, model->mu = d->friction.mu,
   model->slope = d->friction.slope;
   model->presliding = d->friction.presliding, model->bristle_damping = d->friction.bristle_damping;
@@ -68,7 +68,7 @@ static void compile_soil(hxModel *model, const hxDefinition *d) {
   model->bristle_length = d->friction.presliding;
   if (d->soil.law != HX_SOIL_NONE)
     model->bristle_length = d->soil.shear_displacement;
-  else if (on_grid > 0.0 && !hx_is_bristle_law(d->friction.law))
+  else if (on_grid > 0.0 && !hx_friction_kind(d->friction.law).has_bristles)
     model->bristle_length = on_grid;
 }
 
@@ -94,8 +94,9 @@ static void compile_supply(hxModel *model, const hxDefinition *d) {
   model->overload_torque = d->servo.overload_duty / d->servo.duty_max * model->stall_torque;
 }
 
-static const double lock_yield = 1e-3; /* rad  of a locked joint, under its motor's largest torque */
-static const double lock_time = 2e-3;  /* s    damping of a lock over its stiffness */
+static const double lock_yield =
+    1e-3;                             /* rad  of a locked joint, under its motor's largest torque */
+static const double lock_time = 2e-3; /* s    damping of a lock over its stiffness */
 
 /* Computes the constants of the servos' motors, and of the joints' stops and locks. */
 static void compile_servo(hxModel *model, const hxDefinition *d) {

@@ -2,7 +2,6 @@
 
 #include <math.h>
 
-#include "../method.h"
 #include "hexapod/message.h"
 #include "hexapod/range_check.h"
 
@@ -128,12 +127,10 @@ static void check_relations(hxChecker *c, const hxDefinition *d) {
   if (d->friction.mu_static != 0.0 && d->friction.mu_static < d->friction.mu)
     hx_check_fail(c, "friction.mu_static", d->friction.mu_static,
                   "at least friction.mu, or 0, which means the same");
-  else if (d->friction.mu_static > d->friction.mu && d->friction.law == HX_FRICTION_NONE)
+  else if (d->friction.mu_static > d->friction.mu &&
+           !hx_friction_kind(d->friction.law).has_friction)
     hx_check_fail(c, "friction.mu_static", d->friction.mu_static,
                   "0 or friction.mu with friction.law none, which has no friction");
-  if (hx_method(d->solver.method)->error_order == 0 && d->solver.step == 0.0)
-    hx_check_fail(c, "solver.step", d->solver.step,
-                  "a fixed step > 0 with this solver.method, which has no error estimate");
   if (d->body.self_contact == HX_SELF_FORCE && d->body.knee_radius == 0.0 &&
       d->body.shank_radius == 0.0)
     hx_check_fail(c, "body.knee_radius", d->body.knee_radius,

@@ -62,22 +62,33 @@ HX_API void hx_probe_power(const double *x, const double *y, double *power, doub
 /* ---- soil ---- */
 
 /* Writes F_v, its slope, plastic depth, f_n, its elastic part and derivatives, stored energy, shear
- * base and its slope; row NULL: from the definition. */
+ * base and tan phi; row NULL: from the definition. */
 HX_API void hx_probe_soil(const hxSoilDefinition *definition, const double *row, double radius,
-                          double pad, double plastic, double z, double dz, double out[12]) {
+                          double pad, double plastic, double z, double dz, double out[10]) {
   const hxSoilShape shape = {radius, pad, 0.0};
   hxSoil soil;
   if (row)
     hx_soil_from_row(row, &shape, &soil);
   else
     hx_soil_compile(definition, &shape, &soil);
-  const hxSoilCurve virgin = hx_soil_virgin(&soil, z), base = hx_soil_shear_base(&soil, z);
-  const hxSoilForce force = hx_soil_normal_force(&soil, plastic, z, dz);
-  out[0] = virgin.force, out[1] = virgin.slope, out[2] = hx_soil_plastic_depth(&soil, z);
-  out[3] = force.force, out[4] = force.elastic, out[5] = force.stiffness, out[6] = force.viscosity;
-  out[7] = hx_soil_stored_energy(&soil, plastic, z);
-  out[8] = base.force, out[9] = base.slope, out[10] = soil.friction;
-  out[11] = hx_soil_contact(&soil, plastic, z, dz).held.slope;
+  hxReal numbers[HX_SOIL_SIZE];
+  hxSoils soils;
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_splat(((const double *)&soil)[i]);
+  memcpy(&soils, numbers, sizeof soils);
+  const hxReal p = hx_splat(plastic), at = hx_splat(z);
+  const hxSoilCurves virgin = hx_virgin(&soils, at);
+  const hxSoilForces f = hx_soil_forces(&soils, p, at, hx_splat(dz), virgin);
+  const hxReal result[10] = {virgin.force,
+                             virgin.slope,
+                             hx_plastic_depth(&soils, at, virgin),
+                             f.force,
+                             f.elastic,
+                             f.stiffness,
+                             f.viscosity,
+                             hx_stored_energy(&soils, p, at, virgin),
+                             hx_shear_base(&soils, at),
+                             soils.friction};
+  for (int i = 0; i < 10; ++i) out[i] = hx_lane(result[i], 0);
 }
 
 /* Adds 1500 footprints at x = 0, 1, ... of depths 1, 2, ... mm, then in a call 100 of 2 m at the
@@ -85,7 +96,8 @@ HX_API void hx_probe_soil(const hxSoilDefinition *definition, const double *row,
  * back. */
 HX_API void hx_probe_footprints(double depth[3][4]) {
   static const double place[4] = {0.0, 987.0, 988.0, 1499.0};
-  static hxFootprintLog log;
+  static hxFootprint lost[HX_FOOTPRINTS];
+  static hxFootprintLog log = {.lost = lost};
   hx_footprints_clear(&log);
   for (int k = 0; k < 1500; ++k)
     hx_footprints_add(&log, &(hxFootprint){k, 0.0, 1e-3 * (k + 1), 0.4});
@@ -98,20 +110,6 @@ HX_API void hx_probe_footprints(double depth[3][4]) {
 }
 
 HX_API double hx_probe_atan2(double y, double x) { return hx_atan2(y, x); }
-
-HX_API void hx_probe_rotation_matrix(const double p[4], double R[3][3]) {
-  const hxMat3 M = hx_rotation_matrix(quat(p));
-  double column[3][3];
-  put3(M.x, 0, column[0]), put3(M.y, 0, column[1]), put3(M.z, 0, column[2]);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) R[i][j] = column[j][i];
-}
-
-HX_API void hx_probe_quaternion_rate(const double p[4], const double w[3], double out[4]) {
-  const hxQuat d = hx_quaternion_rate(quat(p), hx_splat_vec3(w));
-  out[0] = hx_lane(d.w, 0), out[1] = hx_lane(d.x, 0), out[2] = hx_lane(d.y, 0),
-  out[3] = hx_lane(d.z, 0);
-}
 
 static hxSym3 take_sym3(const double S[3][3]) {
   return (hxSym3){hx_splat(S[0][0]), hx_splat(S[1][1]), hx_splat(S[2][2]),
@@ -169,10 +167,6 @@ HX_API void hx_probe_normal_force(const hxPlant *plant, double closed, double da
   out[3] = hx_lane(f.viscosity, 0);
 }
 
-HX_API double hx_probe_friction(const hxPlant *plant, double speed) {
-  return hx_lane(hx_friction(&plant->model, hx_splat(speed)), 0);
-}
-
 /* Friction over load of the plant's law at a slip velocity, and at a deflection of its bristles.
  * out: -f_t/f_n, db/dt, its slopes stiffness, damping, yield */
 HX_API void hx_probe_sliding(const hxPlant *plant, const double slip[3], const double b[3],
@@ -183,8 +177,8 @@ HX_API void hx_probe_sliding(const hxPlant *plant, const double slip[3], const d
   const hxFrictionAt at = {hx_splat(model->mu), hx_splat(model->static_rise)};
   const hxReal drag = hx_friction_drag(model, at, hx_sqrt(hx_dot(v, v)));
   hxBristle f = {hx_scale(drag, v), hx_zero3(), zero, drag, zero};
-  if (model->friction_law == HX_FRICTION_BRISTLE) f = hx_bristle(model, at, one, z, v);
-  if (model->friction_law == HX_FRICTION_LUGRE) f = hx_lugre(model, at, one, z, v);
+  if (hx_friction_kind(model->friction_law).has_bristles)
+    f = hx_bristle_friction(model, at, one, z, v);
   put3(f.grip, 0, out), put3(f.rate, 0, out + 3);
   out[6] = hx_lane(f.stiffness, 0), out[7] = hx_lane(f.damping, 0), out[8] = hx_lane(f.yield, 0);
 }
@@ -231,14 +225,6 @@ HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
   out[2] = hx_lane(servo.stiffness, 0), out[3] = hx_lane(servo.damping + servo.drag, 0);
 }
 
-/* Computes the ground at a point. out: distance, normal. */
-HX_API void hx_probe_ground(const hxPlant *plant, const double point[3], double out[4]) {
-  const hxGround ground =
-      hx_ground(&plant->model, &plant->state.contact, HX_FOOT, 0, 1, hx_splat_vec3(point), NULL);
-  out[0] = hx_lane(ground.distance, 0);
-  put3(ground.normal, 0, out + 1);
-}
-
 /* A face of a grid at a point, kind: an hxFaceKind; out: distance, normal, its
  * derivative by the point xx yy zz xy xz yz. */
 HX_API void hx_probe_face(const hxTerrain *terrain, int kind, const double point[3],
@@ -263,7 +249,10 @@ HX_API void hx_probe_shares(int count, const double *depth, const double *normal
 /* The upper bound of a sphere's depth in a grid; out: one number. */
 HX_API void hx_probe_depth_bound(const hxTerrain *terrain, const double centre[3], double radius,
                                  double out[1]) {
-  out[0] = hx_terrain_depth_bound(terrain, centre, radius);
+  static hxModel model;
+  const hxVec3 point = hx_splat_vec3(centre);
+  model.terrain = terrain, model.radius[HX_FOOT] = radius;
+  out[0] = hx_lane(hx_grid_depth_bound(&model, HX_FOOT, &point), 0);
 }
 
 /* Switches the plant's contacts and returns them. state: closed, damping, impact speed. */
@@ -311,26 +300,6 @@ HX_API void hx_probe_joint(hxPlant *plant, const hxInput *input, int leg, int jo
   out[19] = hx_lane(w->angle, lane), out[20] = hx_lane(w->speed, lane);
   const hxReal J[6] = {w->J.xx, w->J.yy, w->J.zz, w->J.xy, w->J.xz, w->J.yz};
   for (int i = 0; i < 6; ++i) out[21 + i] = hx_lane(J[i], lane);
-}
-
-/* Computes a foot. out: point, velocity, normal, penetration, approach speed, force on the foot,
- * and the force's derivatives (stiffness, viscosity, drag) for a step of length `ahead`. */
-HX_API void hx_probe_foot(hxPlant *plant, const hxInput *input, int leg, double ahead,
-                          double out[17]) {
-  hxWork work;
-  hxRate rate;
-  hxImplicit implicit = {.z = 1e-3, .ahead = ahead};
-  evaluate(plant, input, 0.0, &implicit, &work, &rate);
-  const int lane = leg % HX_LANES, pack = leg / HX_LANES;
-  const hxContactWork *foot = &work.pack[pack].contact[HX_FOOT];
-  const hxContactSlope *slope = &implicit.slope[pack].contact[HX_FOOT];
-  const hxVec3 tibia = hx_link_vec3(&plant->state.motion, HX_JOINTS - 1, HX_R, leg - lane);
-  put3(hx_add3(tibia, foot->kin.arm), lane, out), put3(foot->kin.velocity, lane, out + 3),
-      put3(foot->kin.normal, lane, out + 6);
-  out[9] = hx_lane(foot->kin.delta, lane), out[10] = hx_lane(foot->kin.ddelta, lane);
-  put3(foot->force, lane, out + 11);
-  out[14] = hx_lane(slope->stiffness, lane), out[15] = hx_lane(slope->viscosity, lane);
-  out[16] = hx_lane(slope->drag, lane);
 }
 
 /* Computes dy/dt under a command that is `age` seconds old: of the bodies, and the powers of
@@ -417,12 +386,12 @@ HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
   return hx_kernels[i]->name;
 }
 
-/* Copies a row of the methods. shape: stages, order, error order; others as in hxMethodRow. */
-HX_API void hx_probe_method(int method, int shape[3], double *gamma, double a[HX_STAGES][HX_STAGES],
+/* Copies a row of the methods. shape: stages, order; others as in hxMethodRow. */
+HX_API void hx_probe_method(int method, int shape[2], double *gamma, double a[HX_STAGES][HX_STAGES],
                             double g[HX_STAGES][HX_STAGES], double c[HX_STAGES],
                             double b[HX_STAGES], double e[HX_STAGES]) {
   const hxMethodRow *row = hx_method(method);
-  shape[0] = row->stages, shape[1] = row->order, shape[2] = row->error_order;
+  shape[0] = row->stages, shape[1] = row->order;
   *gamma = row->gamma;
   memcpy(a, row->a, sizeof row->a), memcpy(g, row->g, sizeof row->g);
   memcpy(c, row->c, sizeof row->c), memcpy(b, row->b, sizeof row->b),

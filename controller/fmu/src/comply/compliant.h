@@ -132,15 +132,16 @@ static inline void hx_compliant_plan(const hxCompliantModel *model, const hxComp
 
 /* Computes the activations of the legs and the lowering of their feet [m] by the depth to which the
  * ground will deform under their loads. phase: of the legs; plane: feet, walking frame [m]; clock:
- * of the gait, in the section of the step. */
+ * of the gait, in the section of the step; activation: factors of the legs before. */
 static inline void hx_compliant_lowered(const hxCompliantModel *model, const hxGaitClock *clock,
                                         const double phase[HX_LEGS], const hxPlane plane[HX_LEGS],
                                         double activation[HX_LEGS], double lowering[HX_LEGS]) {
   for (int k = 0; k < HX_LEGS; ++k)
     activation[k] = clock->awaited[k]
                         ? 0.0
-                        : hx_support_activation(&model->support, phase[k], clock->stayed[k],
-                                                clock->stays[k], clock->walking);
+                        : activation[k] *
+                              hx_support_activation(&model->support, phase[k], clock->stayed[k],
+                                                    clock->stays[k], clock->walking);
   hx_support_lowering(&model->support, plane, activation, lowering);
 }
 

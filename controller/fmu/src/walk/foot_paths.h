@@ -3,6 +3,7 @@
 #ifndef HX_FOOT_PATHS_H
 #define HX_FOOT_PATHS_H
 
+#include "absence.h"
 #include "gait_clock.h"
 #include "kinematics.h"
 #include "swing.h"
@@ -49,6 +50,9 @@ static const double same_distance = 1e-6; /* m, distances that differ by less ar
 /* m, a foot this close to its stance position makes no step */
 static const double home_tolerance = 1e-9;
 static const double nearly_done = 1e-12; /* 1   floor of 1 - s */
+/* 1/s, m/s, downwards, of feet that end their swings at once */
+static const double drop_rate = 10.0, landing_speed = 0.08;
+static const int to_the_left[HX_LEGS] = {0, 1, 2, 5, 4, 3}; /* the legs around the robot */
 
 static inline void hx_foot_paths_compile(const hxControllerDefinition *definition,
                                          const hxLegSolver leg[HX_LEGS], hxFootPathsModel *model) {
@@ -126,7 +130,13 @@ static inline void place_foot(const hxFootPathsModel *model, const hxFootPaths *
                               hxPlane back, hxPlane carried, hxPlannedFeet *feet) {
   const double tau = hx_gait_clock_progress(&model->clock, feet->phase[leg]),
                w = feet->twist.yaw_rate;
+  const double high = feet->height[leg] - model->home_height[leg];
   double s, slope, lift, climb;
+  if (paths->clock.absent[leg]) { /* the foot is above its stance position */
+    const hxPlane place = hx_times(hx_conj(back), aims(model, paths, leg));
+    feet->goal[leg] = hx_plane_add(feet->way, place);
+    feet->pull[leg] = hx_plane(0.0, 0.0);
+  }
   blend(tau, &s, &slope);
   feet->blend[leg] = paths->clock.swinging[leg] ? s : 0.0;
   const hxPlane was = hx_times(back, hx_plane_sub(carried, feet->way)), v = feet->twist.velocity;
@@ -139,6 +149,21 @@ static inline void place_foot(const hxFootPathsModel *model, const hxFootPaths *
   hop(tau, model->step_height, model->touchdown_speed * model->swing_time, &lift, &climb);
   feet->height[leg] = model->home_height[leg] + (paths->clock.swinging[leg] ? lift : 0.0);
   feet->rise[leg] = paths->clock.swinging[leg] ? climb * pace : 0.0;
+  if (paths->clock.absent[leg]) {
+    feet->height[leg] = model->home_height[leg] + model->step_height;
+    feet->velocity[leg] = hx_plane(0.0, 0.0);
+  } else if (paths->clock.dropped[leg] && paths->clock.swinging[leg]) {
+    const double fall = hx_larger(drop_rate * high, landing_speed);
+    feet->height[leg] = model->home_height[leg] + hx_larger(high - fall * model->period, 0.0);
+    feet->rise[leg] = -fall;
+  }
+}
+
+/* Returns whether a foot is a dropped one that has reached the ground. */
+static inline int hx_foot_paths_down(const hxFootPathsModel *model, const hxFootPaths *paths,
+                                     const hxPlannedFeet *feet, int leg) {
+  return paths->clock.dropped[leg] && paths->clock.swinging[leg] &&
+         feet->height[leg] <= model->home_height[leg];
 }
 
 /* Computes the present step again, with those legs in the air that swing in the section. */
@@ -158,7 +183,9 @@ static inline void set_out(const hxFootPathsModel *model, const hxFootPaths *pat
     first->goal[leg] = present.goal[leg];
     first->rolled[leg] = present.rolled[leg];
     first->pull[leg] = paths->clock.swinging[leg] ? present.pull[leg] : hx_plane(0.0, 0.0);
+    first->height[leg] = present.height[leg];
     place_foot(model, paths, leg, back, ground_of(first, leg), first);
+    if (paths->clock.dropped[leg]) first->height[leg] = present.height[leg];
   }
 }
 
@@ -175,6 +202,11 @@ static inline void hx_foot_paths_plan(const hxFootPathsModel *model, const hxPla
     rest(model, now->plane, paths, first);
     return;
   }
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    if (hx_foot_paths_down(model, paths, now, leg)) {
+      clock->swinging[leg] = 0;
+      clock->stayed[leg] = 1;
+    }
   hx_gait_clock_begin_section(&model->clock, number, clock);
   if (old.ending)
     hx_gait_clock_keep_down(&model->clock, old.stays, clock);
@@ -203,6 +235,7 @@ HX_SELDOM static double farthest(const hxFootPathsModel *model, const hxFootPath
   const double w = feet->twist.yaw_rate;
   double largest = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
+    if (paths->clock.absent[leg]) continue;
     const hxPlane p = feet->plane[leg], motion = hx_plane(v.x - w * p.y, v.y + w * p.x);
     const double left = model->clock.duty - begin[leg] + clock_epsilon,
                  time = hx_fraction(left) * model->clock.gait_period;
@@ -213,11 +246,61 @@ HX_SELDOM static double farthest(const hxFootPathsModel *model, const hxFootPath
   return largest;
 }
 
+/* Returns how far a point is inside the polygon of the feet of the legs that stand [m], < 0
+ * outside. */
+HX_SELDOM static double inside(const hxPlane feet[HX_LEGS], const int stands[HX_LEGS],
+                               hxPlane point) {
+  double least = INFINITY;
+  for (int k = 0; k < HX_LEGS; ++k) {
+    int next = (k + 1) % HX_LEGS;
+    if (!stands[to_the_left[k]]) continue;
+    while (!stands[to_the_left[next]]) next = (next + 1) % HX_LEGS;
+    const hxPlane corner = hx_plane_sub(feet[to_the_left[k]], point),
+                  side = hx_plane_sub(hx_plane_sub(feet[to_the_left[next]], point), corner);
+    least = hx_smaller(hx_across(corner, side) / hx_length(side), least);
+  }
+  return least;
+}
+
+/* Returns the least distance of the torso within its support in the coming steps [m] (C58). feet,
+ * begin: as for farthest(). */
+HX_SELDOM static double steadiness(const hxFootPathsModel *model, const hxFootPaths *paths,
+                                   const hxPlannedFeet *feet, const double begin[HX_LEGS],
+                                   const hxAbsenceModel *absent, const hxAbsence *absence) {
+  const hxPlane v = feet->twist.velocity;
+  const double w = feet->twist.yaw_rate;
+  double lift[HX_LEGS], least = INFINITY;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    lift[leg] = hx_fraction(model->clock.duty - begin[leg] + clock_epsilon) *
+                model->clock.gait_period;
+  for (int i = 0; i < 2 * HX_LEGS; ++i) { /* lift-off and touch-down of each leg */
+    const int swings = i / 2;
+    const double time = lift[swings] + (i % 2 ? model->swing_time : 0.0);
+    hxPlane place[HX_LEGS];
+    int stands[HX_LEGS];
+    if (paths->clock.absent[swings]) continue;
+    for (int leg = 0; leg < HX_LEGS; ++leg) {
+      const hxPlane p = feet->plane[leg], motion = hx_plane(v.x - w * p.y, v.y + w * p.x);
+      const hxPlane ahead = hx_plane_add(aims(model, paths, leg),
+                                         hx_scaled(motion, model->landing_lead + lift[leg]));
+      place[leg] = hx_plane_sub(time < lift[leg] + model->swing_time ? p : ahead,
+                                hx_scaled(motion, time));
+      stands[leg] = leg != swings && !paths->clock.absent[leg];
+    }
+    const double steps = nearbyint(time / model->period);
+    const hxPlane torso = hx_absence_torso(absent, absence, (int64_t)steps);
+    least = hx_smaller(inside((const hxPlane *)place, (const int *)stands, torso), least);
+  }
+  return least;
+}
+
 /* Begins the walk anew with feet that stand under a moving body (C55): sets the phases of the legs
  * in the model so that one leg begins to give up its load, the first of those with which the
- * farthest foot goes least far. */
+ * farthest foot goes least far. Without a leg, the torso stays as far within its support as it can.
+ * A leg that is back in service (-1: none) begins in the middle of its swing instead (C58). */
 static HX_SELDOM void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *paths,
-                                         hxPlannedFeet *feet) {
+                                         hxPlannedFeet *feet, const hxAbsenceModel *absent,
+                                         const hxAbsence *absence, int back) {
   hxGaitClockModel *clock = &model->clock;
   const double unloads = hx_gait_clock_unloads(clock);
   const double *offset = clock->gait_offset;
@@ -226,14 +309,23 @@ static HX_SELDOM void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *p
     rest(model, feet->plane, paths, feet);
     return;
   }
-  for (int first = 0; first < HX_LEGS; ++first) {
+  int some = 0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) some |= paths->clock.absent[leg];
+  if (back >= 0) {
+    for (int leg = 0; leg < HX_LEGS; ++leg)
+      begin[leg] = 0.5 + 0.5 * clock->duty + offset[leg] - offset[back];
+    hx_gait_clock_start_at(clock, begin);
+  }
+  for (int first = 0; back < 0 && first < HX_LEGS; ++first) {
+    if (paths->clock.absent[first]) continue;
     for (int leg = 0; leg < HX_LEGS; ++leg) begin[leg] = unloads + (offset[leg] - offset[first]);
-    const double far = farthest(model, paths, feet, begin);
+    const double far = some ? -steadiness(model, paths, feet, begin, absent, absence)
+                            : farthest(model, paths, feet, begin);
     if (far >= least - same_distance) continue;
     least = far;
     hx_gait_clock_start_at(clock, begin);
   }
-  hx_gait_clock_start_standing(clock, &paths->clock);
+  hx_gait_clock_start_standing(clock, back, &paths->clock);
   memset(paths->met, 0, sizeof paths->met);
 }
 
@@ -288,10 +380,11 @@ static inline void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFoo
       blend(tau, &s, &slope);
       feet->rolled[leg] = aim - (aim - before->rolled[leg]) * (1.0 - s) / left;
     }
-    if (paths->met[leg]) { /* the foot stays where it met the ground (C51) */
+    if (paths->met[leg] || paths->clock.dropped[leg]) { /* the foot stays where it is (C51) */
       feet->goal[leg] = ground_of(before, leg);
       feet->pull[leg] = hx_plane(0.0, 0.0);
     }
+    feet->height[leg] = before->height[leg];
     place_foot(model, paths, leg, back, ground_of(before, leg), feet);
   }
 }

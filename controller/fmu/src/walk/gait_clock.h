@@ -32,6 +32,8 @@ typedef struct hxGaitClock {
   int held; /* the clock stands still until feet at the ends of their swings carry load */
   int awaited[HX_LEGS]; /* the clock waits for this foot */
   int ending;           /* another gait follows: legs finish their steps and begin no other */
+  int absent[HX_LEGS];  /* out of service: neither stands nor swings */
+  int dropped[HX_LEGS]; /* ends its swing at once, straight down (C58) */
 } hxGaitClock;
 
 /* cycles by which the clock starts before the first lift-off */
@@ -61,7 +63,10 @@ static inline void hx_gait_clock_compile(const hxControllerDefinition *definitio
 
 /* Stops the clock at its begin, with all legs standing. */
 static inline void hx_gait_clock_stop(const hxGaitClockModel *model, hxGaitClock *clock) {
+  int absent[HX_LEGS];
+  memcpy(absent, clock->absent, sizeof absent);
   memset(clock, 0, sizeof *clock);
+  memcpy(clock->absent, absent, sizeof absent);
   for (int leg = 0; leg < HX_LEGS; ++leg) clock->stayed[leg] = model->late[leg];
 }
 
@@ -76,6 +81,12 @@ static inline double hx_gait_clock_phase(const hxGaitClockModel *model, int leg,
 /* Returns whether a leg stands by the clock a number of periods after the begin of the walk. */
 static inline int hx_gait_clock_stands(const hxGaitClockModel *model, int leg, int64_t number) {
   return hx_gait_clock_phase(model, leg, number) < model->duty;
+}
+
+/* Returns whether a leg in service stands by the clock after a number of periods. */
+static inline int hx_gait_clock_serves(const hxGaitClockModel *model, const hxGaitClock *clock,
+                                       int leg, int64_t number) {
+  return !clock->absent[leg] && hx_gait_clock_stands(model, leg, number);
 }
 
 /* Returns the periods on the clock `number` periods after the section began (C50). */
@@ -93,13 +104,16 @@ static inline double hx_gait_clock_unloads(const hxGaitClockModel *model) {
   return model->duty - 0.5 * model->handover;
 }
 
-/* Begins the walk anew with legs that all stand (C55). */
-HX_SELDOM static void hx_gait_clock_start_standing(const hxGaitClockModel *model,
+/* Begins the walk anew with legs that all stand (C55), but for one that swings (C58); -1: none. */
+HX_SELDOM static void hx_gait_clock_start_standing(const hxGaitClockModel *model, int back,
                                                    hxGaitClock *clock) {
   hx_gait_clock_stop(model, clock);
   clock->walking = 1;
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    clock->standing[leg] = hx_gait_clock_stands(model, leg, 0);
+    clock->standing[leg] = hx_gait_clock_serves(model, clock, leg, 0);
+  if (back < 0) return;
+  clock->swinging[back] = 1;
+  clock->stayed[back] = 0;
 }
 
 /* ----------------------------------------------------------------------------------- sections */
@@ -112,24 +126,42 @@ static inline void hx_gait_clock_begin_section(const hxGaitClockModel *model, in
   memset(clock->awaited, 0, sizeof clock->awaited);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const int stood = hx_gait_clock_stands(model, leg, clock->before);
-    clock->standing[leg] = hx_gait_clock_stands(model, leg, clock->before + 1);
-    clock->lifted[leg] = stood && !clock->standing[leg];
+    clock->standing[leg] = hx_gait_clock_serves(model, clock, leg, clock->before + 1);
+    clock->lifted[leg] = stood && !clock->standing[leg] && !clock->absent[leg];
     clock->stayed[leg] |= clock->lifted[leg];
-    clock->swinging[leg] = clock->swinging[leg] && !clock->standing[leg];
+    clock->swinging[leg] &= !clock->standing[leg] && !clock->absent[leg];
     clock->stays[leg] = 0;
   }
+}
+
+/* Returns whether some leg ends its swing at once. */
+static inline int hx_gait_clock_drops(const hxGaitClock *clock) {
+  int any = 0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) any |= clock->dropped[leg];
+  return any;
 }
 
 /* Lets the legs skip their next steps that have not begun to give up their loads (C55). kept: legs
  * that were to skip them already. */
 HX_SELDOM static void hx_gait_clock_keep_down(const hxGaitClockModel *model,
                                               const int kept[HX_LEGS], hxGaitClock *clock) {
+  const int dropped = hx_gait_clock_drops(clock);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double phase = hx_gait_clock_phase(model, leg, clock->before);
-    const int leaving = phase >= hx_gait_clock_unloads(model) && phase < model->duty && !kept[leg];
-    clock->stays[leg] = !clock->swinging[leg] && !leaving;
+    const int leaving = phase >= hx_gait_clock_unloads(model) && phase < model->duty &&
+                        !kept[leg] && !dropped;
+    clock->stays[leg] = (!clock->swinging[leg] && !leaving) || clock->absent[leg];
     clock->lifted[leg] &= !clock->stays[leg];
   }
+}
+
+/* Ends the swings at once; the walk ends with them (C58). */
+static inline void hx_gait_clock_drop(hxGaitClock *clock) {
+  clock->ending = 1;
+  clock->held = 0;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    clock->dropped[leg] = clock->swinging[leg] &= !clock->absent[leg];
+  memset(clock->awaited, 0, sizeof clock->awaited);
 }
 
 /* Lets the legs skip their steps whose feet are in their stance positions. Returns whether all legs
@@ -137,9 +169,10 @@ HX_SELDOM static void hx_gait_clock_keep_down(const hxGaitClockModel *model,
 static inline int hx_gait_clock_skip(const int home[HX_LEGS], hxGaitClock *clock) {
   int all_home = 1;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    clock->lifted[leg] &= !home[leg];
-    clock->stays[leg] = home[leg] && !clock->swinging[leg];
-    all_home &= home[leg] && !clock->swinging[leg] && !clock->lifted[leg];
+    const int stays = home[leg] || clock->absent[leg];
+    clock->lifted[leg] &= !stays;
+    clock->stays[leg] = stays && !clock->swinging[leg];
+    all_home &= stays && !clock->swinging[leg] && !clock->lifted[leg];
   }
   return all_home;
 }
@@ -158,8 +191,9 @@ static inline void hx_gait_clock_set_out(hxGaitClock *clock) {
 static inline void hx_gait_clock_landing(const hxGaitClockModel *model, const hxGaitClock *clock,
                                          int64_t number, int landing[HX_LEGS]) {
   const int64_t next = hx_gait_clock_reached(clock, number) + 1;
+  const int dropped = hx_gait_clock_drops(clock);
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    landing[leg] = clock->walking && clock->swinging[leg] && hx_gait_clock_stands(model, leg, next);
+    landing[leg] = clock->walking && !dropped && clock->swinging[leg] && hx_gait_clock_stands(model, leg, next);
 }
 
 /* Begins a section in which the clock stands still (C50). number: as for landing. */
@@ -177,7 +211,8 @@ static inline int hx_gait_clock_reach(const hxGaitClockModel *model, const hxGai
                                       int64_t number) {
   if (!clock->walking || clock->held || number == 1) return 1;
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    if (hx_gait_clock_stands(model, leg, clock->before + number) != clock->standing[leg]) return 0;
+    if (hx_gait_clock_serves(model, clock, leg, clock->before + number) != clock->standing[leg])
+      return 0;
   return 1;
 }
 

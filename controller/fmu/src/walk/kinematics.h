@@ -93,6 +93,22 @@ static inline double hx_leg_solver_rolling(const hxLegSolver *model,
   return model->radius * (angle[2] - angle[1] - model->stance_pitch);
 }
 
+/* Computes the joint torques that carry a force on the foot's centre, -J^T f [N m] (C57). force:
+ * torso axes [N]. */
+static inline void hx_leg_solver_load_torques(const hxLegSolver *model,
+                                              const double angle[HX_JOINTS], const double force[3],
+                                              double torque[HX_JOINTS]) {
+  const double a = angle[1] + model->femur_tilt, b = angle[1] - angle[2] + model->tibia_tilt;
+  const hxPlane tibia = hx_scaled(hx_cis(b), model->tibia),
+                arm = hx_plane_add(hx_scaled(hx_cis(a), model->femur), tibia),
+                plane = hx_times(hx_plane(force[0], force[1]),
+                                 hx_cis(-(model->hip_yaw + angle[0]))),
+                foot = {model->coxa_length + arm.x, model->offset_y}, inner = {plane.x, force[2]};
+  torque[0] = -hx_across(foot, plane);
+  torque[1] = -hx_across(arm, inner);
+  torque[2] = hx_across(tibia, inner);
+}
+
 /* Cosine and sine of the angles of a leg's joints, before tilts are added. */
 typedef struct hxBends {
   double x[HX_JOINTS], y[HX_JOINTS];

@@ -20,15 +20,24 @@
 extern "C" {
 #endif
 
+/* A parameter of the plant that gets a value before a macro-step. */
+typedef struct hxTuning {
+  size_t step;
+  double value;
+  unsigned reference;
+} hxTuning;
+
 /* A run of macro-steps: what differs from one macro-step to the next, and where rows go. */
 typedef struct hxMaster {
   hxStepper stepper;
   hxSensors feet, joints, torso;
   const double *time;    /* s     [steps + 1] */
   const double *command; /*       [steps][command_count] */
-  const double *push; /* [steps][push_count] pushes, before them faults of servos; NULL: none */
+  const double *push;    /* [steps][push_count] pushes, before them faults of servos; NULL: none */
   size_t push_count;
-  size_t push_place; /* 1     index in the row */
+  size_t push_place;      /* 1     index in the row */
+  const hxTuning *tuning; /*     [tunings] in order of steps */
+  size_t tunings, tuned;  /* 1     their number, and how many were made */
   const uint8_t *lost; /* 1     [steps] whether the plant keeps its last joint commands; NULL: no */
   size_t drive_place;  /* 1     index of the first joint command in the row */
   size_t drive_count;  /* 1     joint commands */
@@ -42,7 +51,7 @@ typedef struct hxMaster {
 
 /* Number of the layout of hxMaster and of the structures in it. A change of their members, or of
  * what a member means, increases it. */
-#define HX_MASTER_LAYOUT 4
+#define HX_MASTER_LAYOUT 5
 
 /* Layout and size of hxMaster in this library, with which callers check their own. */
 HX_API int hx_master_layout(void);

@@ -5,7 +5,7 @@ import type { Colours } from "../theme";
 import type { PackedRun } from "../types";
 import { RobotScene } from "./robot_scene";
 import type { Relief } from "./surface";
-import { type Stance, Trails } from "./trails";
+import { type StancePhase, Trails } from "./trails";
 
 /** The scene of one run: the robot, the ground, forces and trails at a time. */
 export class Actor {
@@ -23,7 +23,7 @@ export class Actor {
     this.scene = new RobotScene(run.robot, relief, mark);
   }
 
-  addTrails(stances: readonly Stance[], enlarged: number): void {
+  addTrails(stances: readonly StancePhase[], enlarged: number): void {
     this.trails = new Trails(stances, this.recording, this.relief, enlarged, this.run.robot.foot);
     this.scene.add(this.trails);
   }

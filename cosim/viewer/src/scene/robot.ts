@@ -19,7 +19,8 @@ const STRIPE = 0.16; // width of the mark in the control's colour, relative to t
 
 type Solid = Mesh<BufferGeometry, MeshLambertMaterial>;
 
-/** The robot, drawn as capsules and a box; feet light up on the ground. */
+/** The robot, drawn as capsules and a box; feet light up on the ground. Parts of a leg have its
+ * index in `userData.leg`. */
 export class RobotModel extends Group {
   private readonly torso = new Group();
   private readonly links: Mesh[][];
@@ -33,7 +34,7 @@ export class RobotModel extends Group {
     this.add(this.torso);
     this.makeTorso(mark);
     this.links = robot.legs.map((_, leg) => this.makeLinks(leg));
-    this.feet = robot.legs.map(() => this.makeFoot());
+    this.feet = robot.legs.map((_, leg) => this.makeFoot(leg));
   }
 
   /** Moves the robot into a pose; feet in contact light up. */
@@ -81,13 +82,15 @@ export class RobotModel extends Group {
         new CapsuleGeometry(radius, toVector3(link.tip).length(), 8, 20),
         this.robot.colours[this.robot.joints[joint]],
       );
+      mesh.userData.leg = leg;
       this.add(mesh);
       return mesh;
     });
   }
 
-  private makeFoot(): Solid {
+  private makeFoot(leg: number): Solid {
     const foot = solid(new SphereGeometry(this.robot.foot, 28, 18), "#ffffff");
+    foot.userData.leg = leg;
     this.add(foot);
     return foot;
   }

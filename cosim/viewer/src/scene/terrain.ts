@@ -1,15 +1,12 @@
 import {
   Color,
   Group,
-  LineBasicMaterial,
-  LineSegments,
-  Mesh,
   MeshLambertMaterial,
   Vector3,
   type WebGLProgramParametersWithUniforms,
 } from "three";
 import type { Colours } from "../theme";
-import { blockGeometry, smoothGeometry } from "./meshes";
+import { blockMesh, smoothMesh } from "./meshes";
 import type { Surface } from "./surface";
 
 const CONTOURS = 12; // wished between the lowest and the highest place
@@ -25,6 +22,15 @@ attribute vec3 look;
 varying vec3 vLook;
 varying vec3 vPlace;
 varying float vUp;
+`;
+const PLACE = `
+vLook = look;
+vUp = normal.z;
+#ifdef USE_INSTANCING
+vPlace = (instanceMatrix * vec4(position, 1.0)).xyz;
+#else
+vPlace = position;
+#endif
 `;
 const FRAGMENT = `
 uniform vec3 line;
@@ -69,14 +75,9 @@ if (vUp > 0.5) {
 diffuseColor.rgb = tone;
 `;
 
-/** A surface as it is drawn: shaded, with contours or edges, materials in colours of their own. */
+/** A surface as it is drawn: shaded, with contours, materials in colours of their own. */
 export class Terrain extends Group {
-  private readonly material = new MeshLambertMaterial({
-    polygonOffset: true, // edges lie on the faces
-    polygonOffsetFactor: 1,
-    polygonOffsetUnits: 1,
-  });
-  private readonly edge = new LineBasicMaterial();
+  private readonly material = new MeshLambertMaterial();
   private readonly uniforms: Record<string, { value: unknown }> = {
     line: { value: new Color() },
     soil: { value: new Color() },
@@ -91,14 +92,11 @@ export class Terrain extends Group {
     super();
     const looks = (material: number) =>
       LOOKS[surface.materials[material - 1]?.look ?? ""] ?? ([0, 0, 0] as const);
-    if (surface.smooth) this.addMesh(new Mesh(smoothGeometry(surface, looks), this.material));
-    else {
-      const { faces, edges } = blockGeometry(surface, looks);
-      this.addMesh(new Mesh(faces, this.material));
-      const lines = new LineSegments(edges, this.edge);
-      lines.frustumCulled = false;
-      this.add(lines);
-    }
+    const mesh = (surface.smooth ? smoothMesh : blockMesh)(surface, looks, this.material);
+    mesh.receiveShadow = true;
+    mesh.castShadow = true;
+    mesh.frustumCulled = false;
+    this.add(mesh);
     const [low, high] = surface.range;
     this.uniforms.range.value = new Vector3(
       low,
@@ -111,26 +109,18 @@ export class Terrain extends Group {
 
   paint(colours: Colours): void {
     this.material.color.copy(colours.floor);
-    this.edge.color.copy(colours.edge);
     Object.assign(this.uniforms.line, { value: colours.contour });
     Object.assign(this.uniforms.soil, { value: colours.soil });
     Object.assign(this.uniforms.slippery, { value: colours.slippery });
     Object.assign(this.uniforms.patchColour, { value: colours.patch });
-    Object.assign(this.uniforms.wall, { value: colours.dark ? 0.92 : 0.86 });
-  }
-
-  private addMesh(mesh: Mesh): void {
-    mesh.receiveShadow = true;
-    mesh.castShadow = true;
-    mesh.frustumCulled = false;
-    this.add(mesh);
+    Object.assign(this.uniforms.wall, { value: colours.dark ? 0.8 : 0.72 });
   }
 
   private extend(shader: WebGLProgramParametersWithUniforms): void {
     Object.assign(shader.uniforms, this.uniforms);
     shader.vertexShader = VERTEX.concat(shader.vertexShader).replace(
       "#include <begin_vertex>",
-      "#include <begin_vertex>\nvLook = look; vPlace = position; vUp = normal.z;",
+      `#include <begin_vertex>\n${PLACE}`,
     );
     shader.fragmentShader = FRAGMENT.concat(shader.fragmentShader).replace(
       "#include <color_fragment>",

@@ -28,19 +28,23 @@ const COOL = new Color("#f7c948");
 const HOT = new Color("#c2185b");
 
 /** A foot on the ground: its place at touch-down, and row by row its slip [m] since then. */
-export interface Stance {
+export interface StancePhase {
   readonly place: Vector3;
   readonly rows: readonly number[];
   readonly slipped: readonly (readonly [number, number])[];
 }
 
 /** Returns all stances of all feet; [] when the recording lacks the columns. */
-export function findStances(recording: Recording, robot: Robot, relief: Relief): Stance[] {
+export function findStancePhases(
+  recording: Recording,
+  robot: Robot,
+  relief: Relief,
+): StancePhase[] {
   return robot.legs.flatMap(({ name }, index) => {
     const names = [`${name}.contact`, `${name}.slipped.x`, `${name}.slipped.y`];
     if (!recording.has(...names)) return [];
     const [contact, x, y] = names.map((each) => recording.column(each));
-    return periods(contact).map(([begin, end]): Stance => {
+    return periods(contact).map(([begin, end]): StancePhase => {
       const foot = footCentres(robot, poseAt(recording, robot, recording.time[begin]))[index];
       const last = Math.min(end - begin, MOST_POINTS - 1);
       const rows = Array.from({ length: last + 1 }, (_, k) =>
@@ -64,12 +68,12 @@ function periods(flag: Float32Array): [number, number][] {
 }
 
 /** Returns how far a stance's foot slipped in total [m]. */
-function slippedBy({ slipped }: Stance): number {
+function slippedBy({ slipped }: StancePhase): number {
   return Math.hypot(...slipped[slipped.length - 1]);
 }
 
 /** Returns the factor by which all trails are drawn longer, so that the longest are visible. */
-export function enlargement(stances: readonly Stance[]): number {
+export function enlargement(stances: readonly StancePhase[]): number {
   const ways = stances.map(slippedBy).sort((a, b) => a - b);
   const long = ways[Math.floor(0.95 * (ways.length - 1))] ?? 0;
   return ENLARGED.filter((times) => times * long <= WISHED).pop() ?? 1;
@@ -83,7 +87,7 @@ export class Trails extends Group {
   private readonly pieceRows: number[];
 
   constructor(
-    stances: readonly Stance[],
+    stances: readonly StancePhase[],
     private readonly recording: Recording,
     relief: Relief,
     enlarged: number,
@@ -126,7 +130,11 @@ interface Piece {
   readonly colour: Color;
 }
 
-function piecesOf({ place, rows, slipped }: Stance, relief: Relief, enlarged: number): Piece[] {
+function piecesOf(
+  { place, rows, slipped }: StancePhase,
+  relief: Relief,
+  enlarged: number,
+): Piece[] {
   const points = slipped.map(([x, y]) => [place.x + enlarged * x, place.y + enlarged * y]);
   // a trail on a block stays on it: a longer one would climb walls that the foot did not
   const flat = relief.surface && !relief.surface.smooth;
@@ -157,7 +165,7 @@ function makeRibbon(pieces: readonly Piece[]): Mesh<BufferGeometry, MeshBasicMat
   return mesh;
 }
 
-function makeDiscs(stances: readonly Stance[], relief: Relief, radius: number) {
+function makeDiscs(stances: readonly StancePhase[], relief: Relief, radius: number) {
   const material = new MeshBasicMaterial({ transparent: true, opacity: 0.5, depthWrite: false });
   const mesh = new InstancedMesh(
     new CircleGeometry(0.8 * radius, 24),

@@ -327,21 +327,25 @@ size_t hx_environments_observed(const hxEnvSettings *settings) {
   return size;
 }
 
+/* Returns a value within -limit and limit. */
+static double limited(double value, double limit) { return fmin(fmax(value, -limit), limit); }
+
 /* Writes a block and returns the place behind it. */
 static float *show(const hxEnvSettings *settings, int block, const double *value, float *to) {
   const double *scale = settings->observed[block];
   const size_t size = size_of(settings, block);
   if (!sees(settings, block)) return to;
-  for (size_t i = 0; i < size; ++i) to[i] = (float)(value[i] * scale[is_vector(block) ? i : 0]);
+  for (size_t i = 0; i < size; ++i)
+    to[i] = (float)limited(value[i] * scale[is_vector(block) ? i : 0], HX_ENV_LARGEST);
   return to + size;
 }
 
 /* Returns the node below a coordinate in units of the spacing, and the share of the way to the next
  * node. Beyond the first and the last node it stays there. */
 static size_t node_below(double coordinate, size_t nodes, double *share) {
-  const double last = (double)(nodes - 1), limited = fmin(fmax(coordinate, 0.0), last);
-  const double node = fmin(floor(limited), last - 1.0);
-  *share = limited - node;
+  const double last = (double)(nodes - 1), inside = fmin(fmax(coordinate, 0.0), last);
+  const double node = fmin(floor(inside), last - 1.0);
+  *share = inside - node;
   return (size_t)node;
 }
 
@@ -377,8 +381,8 @@ static void scan(const hxEnvironment *environment, float *to) {
   for (size_t i = 0; i < ground->points; ++i) {
     const double a = ground->place[2 * i], b = ground->place[2 * i + 1];
     const double below = height_at(ground, height, r[0] + c * a - s * b, r[1] + s * a + c * b);
-    const double over = fmin(fmax(r[2] - below - ground->clearance, -1.0), 1.0);
-    to[i] = (float)(over * settings->observed[HX_SEE_HEIGHTS][0]);
+    const double over = limited(r[2] - below - ground->clearance, 1.0);
+    to[i] = (float)limited(over * settings->observed[HX_SEE_HEIGHTS][0], HX_ENV_LARGEST);
   }
 }
 

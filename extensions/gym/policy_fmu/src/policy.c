@@ -24,15 +24,12 @@ struct hxPolicy {
   char message[HX_MESSAGE_SIZE];
 };
 
-/* A saved state: a header that identifies it, then definition and state. */
+/* A saved state; the FMI layer puts a header with a checksum before it. */
 typedef struct {
-  uint64_t magic, version, size, checksum;
   hxPolicyDefinition definition;
   hxPolicyState state;
 } hxSavedPolicy;
 
-static const uint64_t magic = 0x6c6f705078786568u; /* "hexxPpol" */
-static const uint64_t saved_version = 1;
 /* 1, of a period: a tick that is later than the present time by less than this is due */
 static const double clock_tolerance = 0.01;
 
@@ -142,35 +139,17 @@ hxStatus hx_policy_step(hxPolicy *policy, const hxPolicyInput *input, const hxPo
 /* ----------------------------------------------------------------------------------------------
  * saved states */
 
-static uint64_t checksum(const hxSavedPolicy *saved) {
-  return hx_checksum(0, &saved->definition, sizeof *saved - offsetof(hxSavedPolicy, definition));
-}
-
 size_t hx_policy_state_size(void) { return sizeof(hxSavedPolicy); }
 
 void hx_policy_get_state(const hxPolicy *policy, void *bytes) {
-  hxSavedPolicy saved = {magic, saved_version, sizeof saved, 0, policy->definition, policy->state};
-  saved.checksum = checksum(&saved);
+  const hxSavedPolicy saved = {policy->definition, policy->state};
   memcpy(bytes, &saved, sizeof saved);
 }
 
-hxStatus hx_policy_set_state(hxPolicy *policy, const void *bytes, size_t size) {
+hxStatus hx_policy_set_state(hxPolicy *policy, const void *bytes) {
   hxSavedPolicy saved;
-  if (size != sizeof saved) {
-    hx_print(policy->message, HX_MESSAGE_SIZE,
-             "saved state: got %zu bytes, expected %zu; save it again with this version", size,
-             sizeof saved);
-    return HX_BAD_STATE;
-  }
   memcpy(&saved, bytes, sizeof saved);
-  if (saved.magic != magic || saved.version != saved_version || saved.size != sizeof saved)
-    return refuse_policy(policy, HX_BAD_STATE,
-                         "saved state: got one of another version, expected one of this version; "
-                         "save it again");
-  if (saved.checksum != checksum(&saved))
-    return refuse_policy(policy, HX_BAD_STATE,
-                         "saved state: got a damaged one, expected one whose checksum is right; "
-                         "save it again");
+  if (hx_policy_definition_check(&saved.definition, policy->message) != HX_OK) return HX_BAD_STATE;
   policy->definition = saved.definition;
   policy->state = saved.state;
   return HX_OK;

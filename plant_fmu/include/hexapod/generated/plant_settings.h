@@ -54,10 +54,6 @@ typedef enum hxMethod {
   HX_METHOD_ROS2,
   /* explicit Dormand-Prince of order 5(4) */
   HX_METHOD_DP54,
-  /* explicit Bogacki-Shampine of order 3(2) */
-  HX_METHOD_BS32,
-  /* explicit classic Runge-Kutta of order 4, fixed step only */
-  HX_METHOD_RK4,
 } hxMethod;
 
 typedef enum hxSoilLaw {
@@ -402,9 +398,9 @@ typedef struct hxInput {
   /* rad/s2  Commanded acceleration, of the kinematic mode alone: speed_ref changes by it within a
    * communication step */
   double acceleration_ref[6][3];
-  /* 1  Share of its torque that the servo can give: 1 healthy, 0 limp; no effect in kinematic mode
+  /* 1  Share of its torque that the servo has lost: 0 healthy, 1 limp; no effect in kinematic mode
    * */
-  double strength[6][3];
+  double weakness[6][3];
   /* 1  From 0.5 on the joint is locked at its angle when the step begins; no effect in kinematic
    * mode */
   double lock[6][3];

@@ -250,6 +250,11 @@ typedef struct hxControllerOutput {
   double planned[6][3];
   /* rad/s2  Planned acceleration, for kinematic drives */
   double acceleration_ref[6][3];
+  /* 0 or 1  The leg is out of service: it is folded away, and the others walk without it */
+  int absent[6];
+  /* 0 or 1  The servo does not do what it is told: it is limp or locked, or its angle sensor is
+   * wrong */
+  int faulty[6][3];
 } hxControllerOutput;
 
 #endif

@@ -54,6 +54,9 @@ enum { HX_ENV_COMMANDS = 3 * HX_ENV_JOINTS, HX_ENV_INPUTS = HX_ENV_COMMANDS + 3 
 /* Inputs of a controller: six of the body command, then these. */
 enum { HX_ENV_BODY = 6, HX_ENV_SENSED = HX_ENV_JOINTS + 3 * HX_ENV_FEET + 4 };
 
+/* Largest size of a value in an observation: larger ones are limited to it. */
+#define HX_ENV_LARGEST 100.0
+
 /* Blocks of an observation, in this order. A block whose scale is 0 is left out. */
 typedef enum hxEnvBlock {
   HX_SEE_VELOCITY, /* 3   m/s    of the torso, torso axes */

@@ -81,11 +81,11 @@ HX_API double hx_policy_time(const hxPolicy *policy);
 HX_API const char *
 hx_policy_message(const hxPolicy *policy); /* of the last failure, "" before any */
 
-/* Save and restore the policy as bytes. hx_policy_set_state checks them; HX_BAD_STATE: the policy
- * is unchanged. */
+/* Save and restore the policy as bytes. HX_BAD_STATE: their definition is not valid; the policy
+ * stays as it was. */
 HX_API size_t hx_policy_state_size(void);
 HX_API void hx_policy_get_state(const hxPolicy *policy, void *bytes);
-HX_API hxStatus hx_policy_set_state(hxPolicy *policy, const void *bytes, size_t size);
+HX_API hxStatus hx_policy_set_state(hxPolicy *policy, const void *bytes);
 
 #ifdef __cplusplus
 }

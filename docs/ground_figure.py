@@ -1,10 +1,9 @@
-"""Compares controls over several scenarios, such as walks on different ground."""
+"""Draws figures of walks under several controls on several kinds of ground."""
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,12 +15,9 @@ from matplotlib.figure import Figure
 
 from hexapod_cosim.controller.figure_style import SETTINGS, WIDTH
 from hexapod_cosim.cosim.common.control_style import control_styles
-from hexapod_cosim.cosim.common.files import atomic_text
-from hexapod_cosim.cosim.report.figures import Figures, figure_files, write_figures
-from hexapod_cosim.cosim.results.side_by_side import Comparisons
+from hexapod_cosim.cosim.results.side_by_side import SEEDS, read_seeds
 from hexapod_cosim.cosim.results.summary import Summary
 
-TABLE, FIGURE = "terrains.csv", "terrains"
 LARGEST, SMALLER = 7.0, 0.75  # size of the first control's mark, and share of each next one's
 ROOM = 1.06  # of an axis over its largest value
 
@@ -32,93 +28,55 @@ class Quantity:
 
     name: str
     unit: str
-    digits: int
     title: str
 
 
 QUANTITIES = (
-    Quantity("walked", "%", 0, "walked to the end"),
-    Quantity("slip", "mm/m", 0, "slip of all feet"),
-    Quantity("peak", "BW", 2, "largest foot force"),
-    Quantity("tilt", "deg", 2, "tilt, RMS"),
-    Quantity("path", "mm/m", 0, "path error"),
+    Quantity("walked", "%", "walked to the end"),
+    Quantity("slip", "mm/m", "slip of all feet"),
+    Quantity("peak", "BW", "largest foot force"),
+    Quantity("tilt", "deg", "tilt, RMS"),
+    Quantity("path", "mm/m", "path error"),
 )
 
 
 @dataclass(frozen=True)
 class Row:
-    """Figures of one control in one scenario: means over its runs that walked to the end."""
+    """Figures of one control on one ground: means over its runs that walked to the end."""
 
     scenario: str
     control: str
-    runs: int
-    walked: int
     values: Mapping[str, float]  # by the quantity's name; NaN where no run walked
-    reason: str  # why the first run ended that did not walk; "" where all walked
 
 
-def terrain_rows(name: str, comparison: Comparisons) -> list[Row]:
-    """Returns the rows of a scenario, one for each control."""
-    return [_row(name, label, runs) for label, runs in comparison.runs.items()]
+def draw(folder: Path, names: Iterable[str], picture: Path) -> None:
+    """Draws the comparisons in folders of these names into a picture."""
+    rows = [
+        _row(name, label, runs)
+        for name in names
+        for label, runs in read_seeds(folder / name / SEEDS).items()
+    ]
+    with matplotlib.rc_context(SETTINGS):
+        draw_terrains(rows).savefig(picture)
 
 
-def _row(name: str, control: str, runs: tuple[Summary, ...]) -> Row:
+def _row(name: str, control: str, runs: list[Summary]) -> Row:
     walked = [run.metrics for run in runs if run.success]
-    lost = [run for run in runs if not run.success]
-    reason = next((run.failure for run in lost), "")
+    tilts = [math.hypot(run["roll_rms"], run["pitch_rms"]) for run in walked]
     values = {
         "walked": 100.0 * len(walked) / len(runs),
         "slip": 1e3 * _mean([run["slip_per_metre"] for run in walked]),
         "peak": _mean([run["peak_force"] for run in walked]),
-        "tilt": math.degrees(
-            _mean([math.hypot(run["roll_rms"], run["pitch_rms"]) for run in walked])
-        ),
+        "tilt": math.degrees(_mean(tilts)),
         "path": 1e3 * _mean([run["path_error"] for run in walked]),
     }
-    return Row(name, control, len(runs), len(walked), values, reason)
+    return Row(name, control, values)
 
 
 def _mean(values: list[float]) -> float:
     """Returns the mean of the finite values, NaN without any."""
     finite = [value for value in values if math.isfinite(value)]
     return float(np.mean(finite)) if finite else math.nan
-
-
-def table_columns(rows: list[Row]) -> dict[str, list[str]]:
-    """Returns the table as texts, column by column."""
-    columns: dict[str, list[str]] = {
-        "scenario": [row.scenario for row in rows],
-        "control": [row.control for row in rows],
-        "walked": [f"{row.walked} of {row.runs}" for row in rows],
-    }
-    for quantity in QUANTITIES[1:]:
-        texts = [_text(row.values[quantity.name], quantity.digits) for row in rows]
-        columns[f"{quantity.name}, {quantity.unit}"] = texts
-    return columns
-
-
-def _text(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else "-"
-
-
-def write_terrains(rows: list[Row], folder: Path) -> list[Path]:
-    """Writes the table as CSV and the figure as PNG and SVG; returns the files."""
-    files = [folder / TABLE]
-    table = rows_as_table(rows)
-    with atomic_text(files[0]) as file:
-        writer = csv.DictWriter(file, table[0], lineterminator="\n")
-        writer.writeheader()
-        for row in table:
-            writer.writerow({name: _cell(value) for name, value in row.items()})
-    with matplotlib.rc_context(SETTINGS):
-        images = {f"{FIGURE}.{kind}": image for kind, image in figure_files(draw_terrains(rows))}
-    return files + write_figures(Figures(images, {}), folder)
-
-
-def _cell(value: Any) -> Any:
-    if not isinstance(value, float):
-        return value
-    return f"{value:.6g}" if math.isfinite(value) else ""
 
 
 def draw_terrains(rows: list[Row]) -> Figure:
@@ -162,18 +120,3 @@ def _draw_quantity(axis: Axes, quantity: Quantity, rows: list[Row], scenarios: l
 def _ends(table: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[Any, Any]:
     """Returns the least and the largest of all controls' values, NaN where one is missing."""
     return table.min(axis=0), table.max(axis=0)
-
-
-def rows_as_table(rows: list[Row]) -> list[dict[str, Any]]:
-    """Returns the rows for JSON."""
-    return [
-        {
-            "scenario": row.scenario,
-            "control": row.control,
-            "runs": row.runs,
-            "walked": row.walked,
-            **{quantity.name: row.values[quantity.name] for quantity in QUANTITIES[1:]},
-            "reason": row.reason,
-        }
-        for row in rows
-    ]

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
 from numpy.typing import NDArray
 
 import hexapod_cosim.extensions.gym.envs  # noqa: F401  registers them
@@ -16,7 +14,6 @@ from hexapod_cosim.extensions.gym.batch import Batch
 from hexapod_cosim.extensions.gym.environment import HexapodEnv
 from hexapod_cosim.extensions.gym.plants import grounds
 from hexapod_cosim.extensions.gym.settings import EnvSettings
-from hexapod_cosim.extensions.gym.vector import HexapodVectorEnv
 from hexapod_cosim.models import HexapodError
 from hexapod_cosim.models.ground.faces import ground_height
 
@@ -163,34 +160,3 @@ def test_the_reward_of_a_step_is_judged_by_the_command_that_it_had() -> None:
 def test_wrong_scans_and_intervals_are_refused(wrong: dict[str, Any], told: str) -> None:
     with pytest.raises(HexapodError, match=f"(?s){told}"):
         HexapodEnv(**wrong)
-
-
-@pytest.mark.filterwarnings("ignore:.*Box observation space.*infinity.*")
-def test_a_picture_shows_the_robot_and_the_ground() -> None:
-    env = gymnasium.make("HexapodRough-v0", render_mode="rgb_array", terrain_seeds=2)
-    try:
-        check_env(env.unwrapped)
-        env.reset(seed=1)
-        picture: Any = env.render()
-        assert (picture.shape, picture.dtype) == ((360, 480, 3), np.uint8)
-        red, _, blue = np.moveaxis(picture.astype(int), -1, 0)
-        assert (blue - red > 25).sum() > 5_000  # the torso is blue
-        assert (red - blue > 60).sum() > 500  # the femurs are orange
-        middle = picture[120:240, 160:320].astype(int)
-        env.step(STILL)
-        after: Any = env.render()
-        assert np.abs(after[120:240, 160:320].astype(int) - middle).mean() < 20.0
-    finally:
-        env.close()
-
-
-def test_a_vector_gives_a_picture_of_each_robot_and_an_unknown_mode_is_refused() -> None:
-    envs = HexapodVectorEnv(2, render_mode="rgb_array")
-    try:
-        envs.reset(seed=1)
-        pictures: Any = envs.render()
-        assert [picture.shape for picture in pictures] == [(360, 480, 3)] * 2
-    finally:
-        envs.close()
-    with pytest.raises(gymnasium.error.Error, match=r"got 'human', expected None or 'rgb_array'"):
-        HexapodEnv(render_mode="human")

@@ -1,0 +1,94 @@
+/* health.h - finds servos that do not do what they are told, and when they do again (C57). Python:
+ * controller/sense/health.py. */
+#ifndef HX_HEALTH_H
+#define HX_HEALTH_H
+
+#include "../walk/kinematics.h"
+
+typedef struct hxHealthModel {
+  double stiffness; /* N m/rad  of the servos */
+  double most;      /* N m, largest torque */
+  double period;    /* s */
+} hxHealthModel;
+
+typedef struct hxHealth {
+  double strange[HX_LEGS][HX_JOINTS]; /* s, of unexplained torque, with its sign */
+  double still[HX_LEGS][HX_JOINTS];   /* s, for which the joint has not moved */
+  double proof[HX_LEGS][HX_JOINTS];   /* s, for which the servo has seemed to work */
+  double angle[HX_LEGS][HX_JOINTS];   /* rad, measured at the last step */
+  int begun;                          /* there was one */
+  int faulty[HX_LEGS][HX_JOINTS];     /* the servo does not work */
+  int locked[HX_LEGS][HX_JOINTS];     /* its joint did not move when this was found */
+} hxHealth;
+
+static const double strange_share = 0.5; /* 1, of the largest torque, that nothing explains */
+static const double strange_time = 0.06; /* s, in one direction: the servo does not work */
+static const double still_speed = 0.05;  /* rad/s, of a joint that does not move */
+static const double sound_share = 0.35;  /* 1, of the largest torque: the servo seems to work */
+/* s, for which a servo must seem to work: longer than a period of the trial */
+static const double proof_time = 1.2;
+
+static inline void hx_health_compile(const hxControllerDefinition *definition,
+                                     hxHealthModel *model) {
+  model->stiffness = definition->servo.kp;
+  model->most = definition->gains.limits.torque;
+  model->period = definition->period;
+}
+
+/* Returns the torque of a servo's model that no load explains, over the largest one. before: angle
+ * a period ago [rad]; load: torque that the joint needs [N m]. */
+static inline double unexplained(const hxHealthModel *model, double speed_max, double before,
+                                 double angle, double angle_ref, double speed_ref,
+                                 double torque_ref, double load) {
+  const double pace = (angle - before) / (model->period * speed_max),
+               reached = angle_ref + model->period * speed_ref,
+               torque = model->stiffness * (reached - angle) + torque_ref,
+               low = -model->most * hx_clamp(1.0 + pace, 0.0, 1.0),
+               high = model->most * hx_clamp(1.0 - pace, 0.0, 1.0);
+  return (hx_clamp(torque, low, high) - load) / model->most;
+}
+
+/* Judges a servo whose unexplained torque is `excess`, over the largest one. rests: its joint has
+ * not moved in the period. */
+static inline void judge(double period, double excess, int rests, int leg, int joint,
+                         hxHealth *health) {
+  double *strange = &health->strange[leg][joint], *still = &health->still[leg][joint],
+         *proof = &health->proof[leg][joint];
+  int *faulty = &health->faulty[leg][joint];
+  const double size = fabs(excess),
+               sign = size > strange_share ? (excess > 0.0 ? 1.0 : -1.0) : 0.0;
+  *still = rests ? *still + period : 0.0;
+  *strange = (sign * *strange > 0.0 ? *strange : 0.0) + sign * period;
+  *proof = size < sound_share ? *proof + period : 0.0;
+  if (!*faulty) health->locked[leg][joint] = *still > strange_time;
+  *faulty = (*faulty && *proof < proof_time) || fabs(*strange) > strange_time;
+}
+
+/* Judges the servos by a period under a command. angle: measured at its end [rad]; force: of the
+ * ground on the feet, torso axes [N]. */
+static inline void hx_health_step(const hxHealthModel *model, const hxLegSolver leg[HX_LEGS],
+                                  const double angle[HX_LEGS][HX_JOINTS],
+                                  const double force[HX_LEGS][3], const hxControllerOutput *command,
+                                  hxHealth *health) {
+  for (int k = 0; k < HX_LEGS; ++k) {
+    double load[HX_JOINTS];
+    hx_leg_solver_load_torques(&leg[k], angle[k], force[k], load);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const double now = angle[k][joint], before = health->begun ? health->angle[k][joint] : now;
+      const double excess = unexplained(
+          model, leg[k].speed_max, before, now, command->angle_ref[k][joint],
+          command->speed_ref[k][joint], command->torque_ref[k][joint], load[joint]);
+      judge(model->period, excess, fabs(now - before) < still_speed * model->period, k, joint,
+            health);
+      health->angle[k][joint] = now;
+    }
+  }
+  health->begun = 1;
+}
+
+/* Returns whether some servo of a leg does not work. */
+static inline int hx_health_lost(const hxHealth *health, int leg) {
+  return health->faulty[leg][0] || health->faulty[leg][1] || health->faulty[leg][2];
+}
+
+#endif

@@ -1,0 +1,125 @@
+"""Reads and writes files of gains (TOML)."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Any
+
+from hexapod_cosim.controller.gains import SECTIONS, Gains, GainsError
+from hexapod_cosim.models import RobotError
+from hexapod_cosim.models.errors import refuse_path
+from hexapod_cosim.models.files import read_text
+from hexapod_cosim.models.schema import (
+    Text,
+    decoding_toml,
+    expect_table,
+    parse_toml,
+    read_given,
+    require,
+    specs,
+)
+
+FORMAT = 5
+
+
+@contextmanager
+def raising_gains_errors() -> Iterator[None]:
+    """Turns the errors of checked records into GainsError."""
+    try:
+        yield
+    except RobotError as error:
+        raise GainsError(
+            error.what,
+            got=error.got,
+            expected=error.expected,
+            fix=error.fix,
+            where=error.where,
+        ) from error
+
+
+def save_gains(gains: Gains, path: str | Path) -> Path:
+    """Writes a gains file (TOML, floats to the last bit).
+
+    Raises GainsError when the file cannot be written.
+    """
+    lines = ["# Gains of compliant and paper control, SI units; made by `hexapod design`."]
+    lines += [f"format = {FORMAT}", *_toml_lines(gains), f"caveats = {json.dumps(gains.caveats)}"]
+    for part in SECTIONS:
+        lines += ["", f"[{part}]", *_toml_lines(getattr(gains, part))]
+    target = Path(path)
+    partial = target.with_name(target.name + ".partial")
+    try:
+        partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        partial.replace(target)
+    except OSError as error:
+        raise GainsError(
+            "cannot write the gains file",
+            got=error.strerror,
+            fix="choose a writable folder",
+            where=str(target),
+        ) from error
+    return target
+
+
+def _toml_lines(record: Any) -> list[str]:
+    """Returns a line for each number and text of a record; a margin without a limit has none."""
+    values = {key: getattr(record, key) for key in specs(type(record))}
+    return [
+        f"{key} = {json.dumps(value) if isinstance(value, str) else repr(value)}"
+        for key, value in values.items()
+        if value != math.inf
+    ]
+
+
+def load_gains(path: str | Path) -> Gains:
+    """Reads and checks a gains file.
+
+    Raises GainsError: the file, the key, what was got and expected.
+    """
+    refuse_path(path, "the gains file", GainsError)
+    try:
+        with decoding_toml(Path(path), kind="gains", error=GainsError):
+            table = parse_toml(read_text(Path(path)))
+    except OSError as error:
+        raise GainsError(
+            "cannot read the gains file",
+            got=error.strerror,
+            fix="make one with `hexapod design`",
+            where=str(path),
+        ) from error
+    if table.pop("format", None) != FORMAT:
+        raise GainsError(
+            "unknown format of gains",
+            expected=f"format = {FORMAT}",
+            fix="make the file again with `hexapod design`",
+            where=str(path),
+        )
+    with raising_gains_errors():
+        return _read(table, str(path))
+
+
+def _read(table: dict[str, Any], where: str) -> Gains:
+    """Returns the gains of a file's tables. Raises RobotError; `where` names the file."""
+    parts = {
+        name: _read_record(kind, table.pop(name, None), f"{where}: [{name}]")
+        for name, kind in SECTIONS.items()
+    }
+    caveats = table.pop("caveats", [])
+    texts = caveats if isinstance(caveats, list) else [caveats]
+    known = tuple(Text().read(text, f"{where}: caveats") for text in texts)
+    head = require(Gains, read_given(Gains, table, where), where)
+    return Gains(**head, **parts, caveats=known)
+
+
+def _read_record(kind: type[Any], value: Any, where: str) -> Any:
+    """Returns a record of a table; a margin without a limit may be absent, or infinite."""
+    table = expect_table(value, where)
+    given = {key: value for key, value in table.items() if value != math.inf}
+    values = read_given(kind, given, where)
+    usual = {item.name: item.default for item in fields(kind) if item.default is not MISSING}
+    return kind(**require(kind, usual | values, where))

@@ -1,0 +1,93 @@
+"""Finds servos that do not do what they are told, and when they do again (C57). C: health.h.
+
+The model of a servo says which torque it gives at its measured angle. The foot's measured force and
+the levers of the leg say which torque its joint needs. What is left, the unexplained torque, is
+small while the servo works: its own weight and inertia, and errors of the model. A limp servo gives
+no torque, however far its joint is from the command; a locked one resists the command without any
+load. Either way the model gives a torque near the servo's largest that nothing explains.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hexapod_cosim.controller.gains import Gains
+from hexapod_cosim.controller.memory import Stateful
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, clamp
+from hexapod_cosim.controller.signals import JointCommand
+from hexapod_cosim.controller.walk.kinematics import LegSolver
+from hexapod_cosim.models import Robot
+
+STRANGE_SHARE = 0.5  # 1    of the largest torque, that nothing explains
+STRANGE_TIME = 0.06  # s    in one direction: the servo does not work
+STILL_SPEED = 0.05  # rad/s    of a joint that does not move
+SOUND_SHARE = 0.35  # 1    of the largest torque: the servo seems to work
+PROOF_TIME = 1.2  # s    for which a servo must seem to work: longer than a period of the trial
+
+
+class Health(Stateful):
+    """State of the servos of one robot.
+
+    Attributes, (6, 3) each:
+        strange: time for which its torque has been unexplained, with its sign [s].
+        angle: measured at the last step [rad].
+        still: time for which a joint has not moved [s].
+        locked: faulty servos whose joints did not move when this was found.
+        proof: time for which a servo has seemed to work [s].
+        faulty: servos that do not work.
+    """
+
+    STATE = ("strange", "angle", "still", "locked", "proof", "faulty")
+
+    def __init__(
+        self, robot: Robot, gains: Gains | None, *, legs: LegSolver, period: float
+    ) -> None:
+        """Starts with sound servos. Kinematic control, without gains, does not watch them."""
+        self.stiffness, self.legs, self.period = robot.servo.kp, legs, period
+        self.most = math.inf if gains is None else gains.limits.torque  # N m
+        self.reset()
+
+    def reset(self) -> None:
+        """Starts anew with sound servos."""
+        self.strange, self.proof, self.still = np.zeros((3, LEGS, 3))
+        self.locked: Mask = np.zeros((LEGS, 3), dtype=np.bool_)
+        self.angle: Array | None = None
+        self.faulty: Mask = np.zeros((LEGS, 3), dtype=np.bool_)
+
+    @property
+    def lost(self) -> Mask:
+        """Returns the legs (6,) of which some servo does not work."""
+        return np.asarray(self.faulty.any(axis=1))
+
+    def _unexplained(self, angle: Array, force: Array, command: JointCommand) -> Array:
+        """Returns the torques (6, 3) of the servos' model that no load explains [N m]."""
+        before = angle if self.angle is None else self.angle
+        load = (angle - before) / (self.period * self.legs.speed_max)
+        reached = command.angle_ref + self.period * command.speed_ref
+        torque = self.stiffness * (reached - angle) + command.torque_ref
+        low = -self.most * clamp(1.0 + load, 0.0, 1.0)
+        torque = clamp(torque, low, self.most * clamp(1.0 - load, 0.0, 1.0))
+        return np.asarray(torque - self.legs.load_torques(angle, force))
+
+    def step(self, angle: Array, force: Array, command: JointCommand) -> None:
+        """Judges the servos by a period under a command.
+
+        Args:
+            angle: (6, 3) measured at its end [rad].
+            force: (6, 3) of the ground on the feet, torso axes [N].
+            command: to the servos.
+        """
+        excess = self._unexplained(angle, force, command) / self.most
+        size, before = np.abs(excess), angle if self.angle is None else self.angle
+        rests = np.abs(angle - before) < STILL_SPEED * self.period
+        self.still = np.where(rests, self.still + self.period, 0.0)
+        self.angle = angle.copy()
+        sign = np.where(size > STRANGE_SHARE, np.sign(excess), 0.0)
+        same = np.where(sign * self.strange > 0.0, self.strange, 0.0)
+        self.strange = same + sign * self.period
+        self.proof = np.where(size < SOUND_SHARE, self.proof + self.period, 0.0)
+        failed = np.abs(self.strange) > STRANGE_TIME
+        self.locked = np.where(self.faulty, self.locked, self.still > STRANGE_TIME)
+        self.faulty = (self.faulty & (self.proof < PROOF_TIME)) | failed

@@ -1,0 +1,176 @@
+"""The controller notices servos that do not work, walks without their legs and takes them back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Measurement, make_gait
+from hexapod_cosim.controller.plane import LEGS, Mask
+from hexapod_cosim.controller.sense.health import PROOF_TIME, STRANGE_TIME, Health
+from hexapod_cosim.controller.walk.absence import (
+    BACK_TIME,
+    SHIFT_TIME,
+    Absence,
+    gait_without,
+)
+from hexapod_cosim.controller.walk.kinematics import LegSolver
+from hexapod_cosim.models import load_robot
+from tests.support.gains import make_gains
+
+H = 0.005  # s    period
+ROBOT = load_robot("athena")
+SOLVER = LegSolver(ROBOT)
+LF, LM, RR = 0, 1, 5
+
+
+def mask(*legs: int) -> Mask:
+    return np.isin(np.arange(LEGS), legs)
+
+
+def steps_until_faulty(
+    offset: float, *, force: float = 0.0, drift: float = 0.0, most: int = 100
+) -> int:
+    """Returns the steps until the femur of LF is found faulty, `most` if it is not.
+
+    offset: of its command from its angle [rad]; force: on its foot, upwards [N]; drift: of angle
+    and command [rad/s].
+    """
+    health = Health(ROBOT, make_gains(ROBOT), legs=SOLVER, period=H)
+    command, forces, angle = JointCommand(), np.zeros((LEGS, 3)), ROBOT.stance.copy()
+    forces[LF, 2] = force
+    for step in range(most):
+        angle[LF, 1] += drift * H
+        command.angle_ref[...] = angle
+        command.angle_ref[LF, 1] += offset
+        health.step(angle, forces, command)
+        if health.faulty.any():
+            assert np.argwhere(health.faulty).tolist() == [[LF, 1]]
+            return step + 1
+    return most
+
+
+def test_the_load_torques_are_those_of_virtual_work() -> None:
+    generator = np.random.default_rng(1)
+    angle = ROBOT.stance + 0.3 * generator.normal(size=(LEGS, 3))
+    force = generator.normal(size=(LEGS, 3))
+    expected = -np.einsum("kij,ki->kj", SOLVER.jacobian(angle), force)
+    np.testing.assert_allclose(SOLVER.load_torques(angle, force), expected, atol=1e-12)
+
+
+def test_a_servo_is_faulty_when_nothing_explains_its_torque_for_some_time() -> None:
+    assert steps_until_faulty(0.10) == pytest.approx(STRANGE_TIME / H, abs=1)
+    assert steps_until_faulty(0.05) == 100  # the torque of 2 N m may be an error of the model
+
+
+def test_a_load_explains_a_torque() -> None:
+    lever = SOLVER.load_torques(ROBOT.stance, np.tile([0.0, 0.0, 1.0], (LEGS, 1)))[LF, 1]
+    assert lever == pytest.approx(-0.12, abs=1e-9)  # m    the foot's distance from its joint
+    assert steps_until_faulty(-0.10, force=30.0) == 100
+    assert steps_until_faulty(0.10, force=30.0) < 100
+
+
+def test_a_joint_that_is_as_fast_as_it_can_is_no_fault() -> None:
+    """A servo gives no torque at its largest speed, however far the command is ahead."""
+    assert steps_until_faulty(0.5, drift=0.9 * ROBOT.servo.speed_max) == 100
+
+
+def test_a_servo_is_sound_again_when_it_has_followed_for_some_time() -> None:
+    health = Health(ROBOT, make_gains(ROBOT), legs=SOLVER, period=H)
+    command, forces, angle = JointCommand(), np.zeros((LEGS, 3)), ROBOT.stance.copy()
+    command.angle_ref[...] = angle + mask(RR)[:, None] * [0.0, 0.0, 0.2]
+    for _ in range(20):
+        health.step(angle, forces, command)
+    assert health.locked[RR].tolist() == [True, True, True]
+    assert health.lost.tolist() == mask(RR).tolist()
+    command.angle_ref[...] = angle
+    count = 0
+    while health.lost.any():
+        health.step(angle, forces, command)
+        count += 1
+    assert count == pytest.approx(PROOF_TIME / H, abs=1)
+
+
+@pytest.mark.parametrize("absent", [(LF,), (LM,), (LF, RR)])
+@pytest.mark.parametrize("backwards", [False, True])
+def test_the_other_legs_walk_a_wave(absent: tuple[int, ...], backwards: bool) -> None:
+    gait = gait_without(make_gait(ROBOT), mask(*absent), backwards=backwards)
+    others = LEGS - len(absent)
+    assert gait.duty == pytest.approx(1.0 - 1.0 / others)
+    swings = [
+        np.flatnonzero(~gait.stance(clock) & ~mask(*absent)).tolist()
+        for clock in (np.arange(others) + 0.5) / others
+    ]
+    order = [leg for swing in swings for leg in swing]
+    assert sorted(order) == np.flatnonzero(~mask(*absent)).tolist()  # one at a time
+    wave = [leg for leg in (0, 5, 4, 3, 2, 1) if leg not in absent]
+    turned = [wave[(k + wave.index(order[0])) % others] for k in range(others)]
+    assert (order == turned) is not backwards
+
+
+def test_the_gait_of_all_legs_is_the_own_one() -> None:
+    gait = make_gait(ROBOT)
+    assert gait_without(gait, mask(), backwards=False) is gait
+
+
+def lost(*legs: int) -> Absence:
+    foot = SOLVER.forward(ROBOT.stance)
+    absence = Absence(SOLVER, foot[:, 0] + 1j * foot[:, 1], handover=0.065, period=H)
+    assert absence.change(mask(*legs), JointCommand())
+    return absence
+
+
+def test_the_torso_moves_over_the_other_feet_and_the_walk_takes_it_back() -> None:
+    absence = lost(LF)
+    others = absence.home[~mask(LF)].mean()
+    others *= 0.045 / abs(others)  # as far as the legs' reach allows
+    assert absence.torso(0) == 0.0
+    assert absence.torso(round(SHIFT_TIME / H)) == pytest.approx(others)
+    way = H * sum(absence.drift(k) for k in range(round((SHIFT_TIME + BACK_TIME) / H) + 1))
+    assert way == pytest.approx(-others, rel=1e-4)
+
+
+def test_a_lost_leg_gives_up_its_load_smoothly_and_others_keep_theirs() -> None:
+    absence = lost(LM)
+    share = np.array([absence.presence(k) for k in range(20)])
+    assert share[0, LM] == 1.0
+    assert share[-1, LM] == 0.0
+    assert np.diff(share[:, LM]).max() <= 0.0
+    assert -np.diff(share[:, LM]).min() < 0.13
+    assert (np.delete(share, LM, axis=1) == 1.0).all()
+
+
+def test_four_legs_remain_in_service() -> None:
+    absence = lost(LF)
+    assert absence.change(mask(LF, LM, RR), JointCommand())
+    assert absence.legs.tolist() == mask(LF, LM).tolist()
+    assert not absence.change(mask(LF, LM, RR), JointCommand())
+
+
+@pytest.mark.parametrize("law", ["compliant", "paper"])
+def test_a_leg_that_does_not_move_is_folded_and_comes_back_without_a_jump(law: str) -> None:
+    """The joints give way to their loads at once. Those of LM rest from 2 s to 5 s."""
+    controller = Controller(
+        ROBOT, period=H, gait=make_gait(ROBOT), gains=make_gains(ROBOT), law=law
+    )
+    measurement = Measurement(angle=ROBOT.stance.copy())
+    absent, angles = [], []
+    for k in range(2000):
+        out = controller.step(k * H, BodyCommand(vx=0.08), measurement)
+        resting = measurement.angle[LM].copy()
+        support = ~controller.diagnostics.swinging & ~controller.diagnostics.absent
+        measurement.foot_force[:, 2] = np.where(support, ROBOT.weight / support.sum(), 0.0)
+        load = SOLVER.load_torques(out.angle_ref, measurement.foot_force)
+        measurement.angle[...] = out.angle_ref + (out.torque_ref - load) / ROBOT.servo.kp
+        if 400 <= k < 1000:
+            measurement.angle[LM] = resting
+        absent.append(controller.diagnostics.absent.copy())
+        angles.append(out.angle_ref.copy())
+    gone = np.flatnonzero(np.array(absent)[:, LM])
+    assert not np.delete(absent, LM, axis=1).any()
+    assert 400 < gone[0] < 600  # within a gait cycle
+    assert 1000 + PROOF_TIME / H <= gone[-1] < 1600
+    steps = np.abs(np.diff(np.delete(angles, LM, axis=1), axis=0))
+    assert steps[gone[0] - 1 : gone[0] + 100].max() < 0.05
+    assert steps[gone[-1] - 100 : gone[-1] + 100].max() < 0.05
+    assert controller.gait == make_gait(ROBOT)
