@@ -20,6 +20,7 @@ UNITS = 1000.0  # of the load at full duty
 def read(path: Path, table: Mapping[str, Any]) -> BenchLog:
     """Returns the log of a file's table. Raises KeyError and others for a file of another kind."""
     entries, load = table["entries"], np.round(100.0 * column(table["entries"], "torque"))
+    voltage = column(entries, "input_volts")
     return BenchLog(
         where=str(path),
         motor=table["motor"],
@@ -34,6 +35,6 @@ def read(path: Path, table: Mapping[str, Any]) -> BenchLog:
         angle=column(entries, "position"),
         speed=column(entries, "speed"),
         duty=np.where(load >= NEGATIVE, load - NEGATIVE, -load) / UNITS,
-        voltage=column(entries, "input_volts"),
+        voltage=np.where(voltage > 0.0, voltage, np.median(voltage)),  # 0: a failed reading
         on=column(entries, "torque_enable"),
     )
