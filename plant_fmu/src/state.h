@@ -297,13 +297,14 @@ enum { HX_MEASURED_LINES = offsetof(hxMeasured, contact_loss) / (HX_SLOTS * size
 
 typedef struct hxState {
   double time;
-  double next_step;       /* s  step that the error control proposes next */
-  double first_step;      /* s  the same for a call's first step, with new inputs */
-  double stored_at_start; /* J  stored energy at the start of the energy audit */
-  double parameter_work;  /* J  given by changes of parameters since */
-  double call_start;      /* s  start of the call that an event interrupted */
-  double call_input;      /* 1  checksum of its input, a whole number; 0: no such call */
-  double supply;          /* 1  hxCommand.supply and duty of the last call */
+  double next_step;        /* s  step that the error control proposes next */
+  double first_step;       /* s  the same for a call's first step, with new inputs */
+  double stored_at_start;  /* J  stored energy at the start of the energy audit */
+  double parameter_work;   /* J  given by changes of parameters since */
+  double call_start;       /* s  start of the call that an event interrupted */
+  double call_input;       /* 1  checksum of its input, a whole number; 0: no such call */
+  double call_evaluations; /* 1  evaluations before the last call began */
+  double supply;           /* 1  hxCommand.supply and duty of the last call */
   double duty[HX_JOINTS][HX_SLOTS];
   double locked[HX_JOINTS][HX_SLOTS]; /* 1    1: the joint is locked */
   double held[HX_JOINTS][HX_SLOTS];   /* rad  where it was locked */
@@ -337,36 +338,12 @@ static inline void hx_copy_gears(hxMoment *to, const hxMoment *from) {
   memcpy(to->motor_speed, from->motor_speed, sizeof to->motor_speed);
 }
 
-/* Copies the state of contacts on rigid ground: nothing else of it changes there. */
-static inline void hx_copy_rigid_contacts(hxContactState *to, const hxContactState *from) {
-  memcpy(to, from, offsetof(hxContactState, on_soil));
-  memcpy(to->cell, from->cell, sizeof to->cell);
-  memcpy(to->nearest, from->nearest, sizeof to->nearest);
-}
-
-/* Copies the state of the first row of contacts: nothing else of it changes on rigid planes if the
- * model has no other rows. */
-static inline void hx_copy_foot_contacts(hxContactState *to, const hxContactState *from) {
-  memcpy(to->closed, from->closed, sizeof to->closed[0]);
-  memcpy(to->damping, from->damping, sizeof to->damping[0]);
-  memcpy(to->impact_speed, from->impact_speed, sizeof to->impact_speed[0]);
-  memcpy(to->stiffness, from->stiffness, sizeof to->stiffness[0]);
-  memcpy(to->mu, from->mu, sizeof to->mu[0]);
-  memcpy(to->static_rise, from->static_rise, sizeof to->static_rise[0]);
-}
-
 /* Copies the parts of a state that a step of this model changes. */
 static inline void hx_copy_state(const hxModel *model, hxState *to, const hxState *from) {
   const size_t rest = offsetof(hxState, evaluations);
-  const int plain = model->listed == 1 && !model->terrain && !model->has_soil;
   memcpy(to, from,
          model->elastic ? offsetof(hxState, contact) : offsetof(hxState, motion.deflection));
-  if (plain)
-    hx_copy_foot_contacts(&to->contact, &from->contact);
-  else if (!model->has_soil)
-    hx_copy_rigid_contacts(&to->contact, &from->contact);
-  else
-    to->contact = from->contact;
+  to->contact = from->contact;
   memcpy((char *)to + rest, (const char *)from + rest, offsetof(hxState, moment.contact[1]) - rest);
   for (int k = 1; k < model->listed; ++k)
     to->moment.contact[model->row[k]] = from->moment.contact[model->row[k]];

@@ -144,7 +144,7 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   do {
     status = advance_part(plant, &call, t_end, events);
     events->continues = 1;
-  } while (status == HX_OK && plant->state.time < t_end && !(events->stop && events->found));
+  } while (status == HX_OK && plant->state.time < t_end && !hx_ends_here(events));
   if (status == HX_OK) return HX_OK;
   hx_copy_state(&plant->model, &plant->state, before);
   if (locks) hx_plant_derive_stops(plant);
