@@ -86,8 +86,8 @@ def test_the_scenario_of_the_readme_is_valid(readme_folder: Path) -> None:
 # The how-to pages: what can be run here runs as typed, and their links lead somewhere.
 
 PAGES = Path(__file__).parents[2] / "docs" / "howto"
-COMMANDS = commands(PAGES / "fmpy.md", "fmpy")
-PYTHON = [text for kind, text in blocks(PAGES / "fmpy.md") if kind == "python"]
+COMMANDS = commands(PAGES / "fmi.md", "fmpy")
+PYTHON = [text for kind, text in blocks(PAGES / "fmi.md") if kind == "python"]
 SHORT = "0.5"  # s
 SHORTER = ["--set", f"duration={SHORT}", "--set", "outputs.plots=false"]
 
