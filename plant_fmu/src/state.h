@@ -158,6 +158,9 @@ typedef struct hxModel {
   double voltage, duty_max, supply_resistance; /* V, 1, ohm */
   hxHeat heat;
   double bus_period, command_step; /* s, rad  0 in kinematic mode */
+  double current_torque;           /* N m    k_t times the largest current; huge: no limit */
+  double goal_speed;               /* rad/s  of the firmware's setpoints; 0: no limit */
+  double overload_time, overload_torque, overload_left; /* s, N m, 1  eq. 59 */
   double ground_point[3], ground_normal[3];
   double soil[HX_SOIL_SHAPES][HX_SOIL_SIZE]; /* hxSoil of each shape, of the definition */
   double bristle_length;                     /* m  presliding, or shear displacement of the soil */
@@ -188,6 +191,15 @@ typedef struct hxBus {
   double start; /* s  of the first transmission */
   double sent;  /* 1  transmissions since */
 } hxBus;
+
+/* What the servos' firmware remembers, legs innermost. */
+typedef struct hxFirmware {
+  double angle[HX_JOINTS][HX_SLOTS];  /* rad    setpoints at the last command (eq. 58), */
+  double rate[HX_JOINTS][HX_SLOTS];   /* rad/s  their speed since, */
+  double time;                        /* s      and its time */
+  double loaded[HX_JOINTS][HX_SLOTS]; /* s  of a duty above the overload limit (eq. 59), with the
+                                       *    sign of the duty */
+} hxFirmware;
 
 /* State of the contacts. It changes at touch-down and lift-off, plastic depth and nearest points at
  * the end of steps; never within a step. */
@@ -297,6 +309,7 @@ typedef struct hxState {
   double locked[HX_JOINTS][HX_SLOTS]; /* 1    1: the joint is locked */
   double held[HX_JOINTS][HX_SLOTS];   /* rad  where it was locked */
   hxBus bus;
+  hxFirmware firmware;
   hxPlantMotion motion;
   hxContactState contact;
   double evaluations, steps, rejected, touchdowns;
