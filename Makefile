@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+RUNTIME := $(VENV)/.runtime# what the hexapod command needs, without the packages of the tests
 LOCK ?=# a file of pinned requirements with hashes, which .ci/run gives; without one pip chooses versions
 PARALLEL := -n auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder# a process a core; files stay whole, see tests/conftest.py
 CMAKE = PATH="$(CURDIR)/$(BIN):$$PATH" cmake
@@ -32,7 +33,7 @@ SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_e
 	test-robots test-extensions \
 	test-wheels test-metadata wheels test-compilers fuzz fuzz-short lint-c check bench \
 	bench-quick format generate \
-	fmu typing clean docs coverage lock audit
+	fmu typing clean docs docs-computed bench-waiting coverage lock audit
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -58,7 +59,8 @@ help:
 	@echo "make check     formatters, linters, types, generated files, warnings of gcc and clang"
 	@echo "make lint-c    warnings of gcc and clang alone"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
-	@echo "make docs      the documentation's site: build/docs/index.html (1 min)"
+	@echo "make docs      the documentation's site: build/docs/index.html (1 min); docs-computed: with notebooks run and validation computed (8 min)"
+	@echo "make bench-waiting  how long people wait for commands, a stopwatch table (2 min)"
 	@echo "make format    formats C and Python"
 	@echo "make generate  generated/ of the FMUs from their interface.toml, and the picture of the rooms"
 	@echo "make fmu       out/athena.fmu and out/phantomx_mk4.fmu"
@@ -73,8 +75,17 @@ help-extensions::
 
 setup: $(STAMP)
 
-# installed anew whenever the C sources or the project's description change
-$(STAMP): $(SOURCES)
+# both are installed anew whenever the C sources or the project's description change
+$(STAMP): $(SOURCES) | $(VENV)/.python
+	$(if $(LOCK),PIP_CONSTRAINT= $(BIN)/python -m pip install --quiet --require-hashes --requirement $(LOCK))
+	$(BIN)/python -m pip install --quiet $(if $(LOCK),--no-deps --no-build-isolation --editable .,--editable '.[test]')
+	@touch $@ $(RUNTIME)
+
+$(RUNTIME): $(SOURCES) | $(VENV)/.python
+	$(BIN)/python -m pip install --quiet --editable .
+	@touch $@
+
+$(VENV)/.python:
 	@for cc in "$${CC:-cc}" gcc clang; do command -v $$cc >/dev/null && exit 0; done; \
 	echo "no C compiler: looked for $${CC:-cc}, gcc and clang, found none; install one (Debian, Ubuntu: apt-get install gcc libc6-dev)" \
 	"or name yours with CC=..." >&2; exit 1
@@ -84,11 +95,9 @@ $(STAMP): $(SOURCES)
 	"install it (Debian, Ubuntu: apt-get install python3 python3-venv) or name another one with PYTHON=..." >&2; exit 1; }
 	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV)
 	@echo "pip loads packages and compiles the C code: a few minutes without output"
-	$(if $(LOCK),PIP_CONSTRAINT= $(BIN)/python -m pip install --quiet --require-hashes --requirement $(LOCK))
-	$(BIN)/python -m pip install --quiet $(if $(LOCK),--no-deps --no-build-isolation --editable .,--editable '.[test]')
 	@touch $@
 
-demo: setup
+demo: $(RUNTIME)
 	$(BIN)/hexapod compare demo_course -o out/demo
 
 test: setup typing
@@ -104,7 +113,7 @@ test-browser: setup
 test-importers: setup
 	$(BIN)/python -m tools.importers.compare
 
-test-platforms: wheels
+test-platforms: setup wheels
 	$(PYTHON) tools/install_emulators.py
 	HEXAPOD_PLATFORMS=all $(BIN)/python -m pytest tests/fmi/test_platforms.py tests/fmi/test_platform_walks.py tests/export/test_cross_build.py
 	HEXAPOD_PLATFORMS=all HEXAPOD_WHEELS=$(WHEELS) $(BIN)/python -m pytest tests/release/test_windows_wheel.py
@@ -126,14 +135,14 @@ test-robots: setup
 WHEELS := dist
 RELEASE := $(VENV)/.release
 
-$(RELEASE): $(STAMP)
+$(RELEASE): $(RUNTIME)
 	$(BIN)/python -m pip install --quiet build wheel twine auditwheel ziglang
 	@touch $@
 
-wheels: setup $(RELEASE)
+wheels: $(RELEASE)
 	$(BIN)/python -m tools.wheels $(WHEELS)
 
-test-wheels: wheels
+test-wheels: setup wheels
 	HEXAPOD_WHEELS=$(WHEELS) $(BIN)/python -m pytest -v tests/release
 
 METADATA := build/metadata
@@ -222,9 +231,22 @@ bench: setup
 bench-quick: setup
 	$(BIN)/python -m benchmarks.run --quick
 
-docs: setup
+DOCS := $(VENV)/.docs
+$(DOCS): $(RUNTIME)
+	$(BIN)/python -m pip install --quiet --editable '.[docs,platforms]'
+	@touch $@
+
+# the pages and the reference; the notebooks run and the validation computed by docs-computed
+docs: $(DOCS)
+	rm -rf build/docs
+	$(BIN)/python -m tools.docs --quick
+
+docs-computed: setup
 	rm -rf build/docs
 	$(BIN)/python -m tools.docs
+
+bench-waiting: $(RUNTIME)
+	$(BIN)/python -m benchmarks.waiting
 
 format: setup
 	$(BIN)/ruff check --fix-only --quiet .

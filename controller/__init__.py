@@ -3,10 +3,8 @@
 Imports `models`.
 """
 
-from hexapod_cosim.controller.controller import (
-    Controller,
-    ControllerError,
-)
+from hexapod_cosim.controller.checks import ControllerError
+from hexapod_cosim.controller.controller import Controller
 from hexapod_cosim.controller.gains import (
     SWITCHES,
     Gains,

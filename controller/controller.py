@@ -15,7 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.compliant import Compliant, PresentStep, sense
+from hexapod_cosim.controller.checks import (
+    ControllerError,
+    check_law,
+    check_period,
+    gains_warnings,
+)
+from hexapod_cosim.controller.comply.compliant import Compliant, sense
 from hexapod_cosim.controller.comply.paper import Paper, Step
 from hexapod_cosim.controller.comply.posture import LEVEL
 from hexapod_cosim.controller.gains import Gains, Parts
@@ -30,41 +36,10 @@ from hexapod_cosim.controller.walk.fade import Fade
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.gait_clock import NO_LEG
 from hexapod_cosim.controller.walk.kinematics import LegSolver
-from hexapod_cosim.models import HexapodError, Robot, unknown_name
+from hexapod_cosim.models import Robot
 
 ALL_PARTS = Parts()
-LAWS = ("compliant", "paper")  # what the feet's forces do; without gains control is kinematic
 CLOCK_TOLERANCE = 0.01  # 1    of a period, between the time given and the steps counted
-
-
-class ControllerError(HexapodError):
-    """The controller cannot be built, or was called at a wrong time."""
-
-
-def _check_period(period: float, gait: Gait) -> None:
-    """Raises ControllerError unless stance and swing of the gait are longer than the period [s]."""
-    shorter = gait.period * min(gait.duty, 1.0 - gait.duty)
-    if not 0.0 < period < shorter:
-        raise ControllerError(
-            "impossible controller period",
-            got=period,
-            expected=f"0 < period < {shorter:g} s, the gait's shorter phase",
-            fix="shorten the period or slow the gait",
-        )
-
-
-def _check_law(law: str) -> None:
-    """Raises HexapodError for an unknown name."""
-    if law not in LAWS:
-        raise unknown_name("law", law, LAWS)
-
-
-def gains_warnings(robot: Robot, gains: Gains | None, period: float) -> tuple[str, ...]:
-    """Returns warnings of gains for another robot or period [s], and the caveats of the gains."""
-    if gains is None:
-        return ()
-    mismatch = gains.mismatch(robot, period=period)
-    return (*(() if mismatch is None else (mismatch,)), *gains.caveats)
 
 
 class Controller(Stateful):
@@ -90,8 +65,8 @@ class Controller(Stateful):
         parts: Parts = ALL_PARTS,
         law: str = "compliant",
     ) -> None:
-        _check_period(period, gait)
-        _check_law(law)
+        check_period(period, gait)
+        check_law(law)
         self.robot, self.period, self.gains, self.parts = robot, period, gains, parts
         self.legs, self.stance, self.law = LegSolver(robot), robot.stance, law
         self.fade = Fade(period=period)
@@ -149,7 +124,7 @@ class Controller(Stateful):
         gait begins with the feet where they are. Raises ControllerError for a gait that is too fast
         for the period, and then changes nothing.
         """
-        _check_period(self.period, gait)
+        check_period(self.period, gait)
         self._asked = gait
         self._change()
         self._adopt()
@@ -179,7 +154,7 @@ class Controller(Stateful):
         next control begins as after reset(). Raises HexapodError for an unknown law, and then
         changes nothing.
         """
-        _check_law(law)
+        check_law(law)
         self.gains, self.law = gains, law
         self.warnings = gains_warnings(self.robot, gains, self.period)
         plan, self.health = self.plan, Health(self.robot, gains, legs=self.legs, period=self.period)
@@ -225,35 +200,7 @@ class Controller(Stateful):
         joints = paper.actuate(feet)
         out.angle_ref[...], out.speed_ref[...] = joints.angle, joints.speed
         shown.unreachable[...] = joints.unreachable
-        shift = paper.shift
-        self._show(rows_of(shift.real, shift.imag, paper.lift), NO_LEG)
-
-    def _present_step(self, compliant: Compliant) -> PresentStep:
-        """Returns planned loads and geometry of the present step for the laws (C15 to C20)."""
-        plan, now, speed = self.plan, self.plan.now, self._out.speed_ref
-        laden = plan.planner.laden()
-        demand = compliant.dynamics.demand(plan.motion(), speed, now.posture, laden)
-        feet = now.plane + now.shift
-        load = compliant.plan(
-            demand,
-            now.activation,
-            feet=feet,
-            height=plan.lift(),
-            rise=now.feet.rise,
-            swinging=plan.paths.clock.swinging,
-            awaited=plan.paths.clock.awaited,
-            overspeed=bool((np.abs(speed) >= self.legs.speed_max).any()),
-        )
-        return PresentStep(
-            load=load,
-            climb=self.legs.speeds(now.pose, 0.0, 1.0),
-            value=now.value,
-            posture=now.posture,
-            plane=now.feet.plane,
-            torso=now.torso,
-            height=now.height,
-            rolled=now.feet.rolled,
-        )
+        self._show(rows_of(paper.shift.real, paper.shift.imag, paper.lift), NO_LEG)
 
     def _show(self, shift: Array, fallback: Mask) -> None:
         """Copies corrections of the feet (6, 3) [m] and fallbacks (6,) into the diagnostics."""
@@ -338,7 +285,7 @@ class Controller(Stateful):
         if self.paper is not None:
             self._correct_paths(self.paper, measurement)
         if self.compliant is not None:
-            step = self._present_step(self.compliant)
+            step = self.plan.present_step(self._out.speed_ref)
             raised = self.compliant.step(step, measurement, self._out)
             still = np.zeros(LEGS)
             self._show(rows_of(still, still, raised), self.compliant.laws.fallback)

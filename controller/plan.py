@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.compliant import Compliant
+from hexapod_cosim.controller.comply.compliant import Compliant, PresentStep
 from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.gains import Parts
 from hexapod_cosim.controller.memory import Stateful
@@ -264,4 +264,33 @@ class WalkPlan(Stateful):
             return Neighbours((None, now.masses, None), (None, now.pose, None))
         return Neighbours(
             (before.masses, now.masses, after.masses), (before.pose, now.pose, after.pose)
+        )
+
+    def present_step(self, speed: Array) -> PresentStep:
+        """Returns planned loads and geometry of the present step for the laws (C15 to C20).
+
+        speed: (6, 3) of the joints [rad/s].
+        """
+        laws, now, clock = self.laws, self.now, self.paths.clock
+        assert laws is not None
+        demand = laws.dynamics.demand(self.motion(), speed, now.posture, self.planner.laden())
+        load = laws.plan(
+            demand,
+            now.activation,
+            feet=now.plane + now.shift,
+            height=self.lift(),
+            rise=now.feet.rise,
+            swinging=clock.swinging,
+            awaited=clock.awaited,
+            overspeed=bool((np.abs(speed) >= self.legs.speed_max).any()),
+        )
+        return PresentStep(
+            load=load,
+            climb=self.legs.speeds(now.pose, 0.0, 1.0),
+            value=now.value,
+            posture=now.posture,
+            plane=now.feet.plane,
+            torso=now.torso,
+            height=now.height,
+            rolled=now.feet.rolled,
         )

@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { CHUNK = 64 }; /* rows that are read or written at once */
 
@@ -164,6 +165,24 @@ hxStatus hx_arrays_directional(hxInstance *instance, const unsigned unknown[], s
   const hxStatus status = knowns ? hx_instance_directional(instance, unknowns, n_result, knowns,
                                                            n_change, change, result)
                                  : HX_INVALID_ARGUMENT;
+  free(knowns);
+  free(unknowns);
+  return status;
+}
+
+hxStatus hx_arrays_adjoint(hxInstance *instance, const unsigned unknown[], size_t n_unknown,
+                           const unsigned known[], size_t n_known, const double seed[],
+                           size_t n_seed, double result[], size_t n_result) {
+  unsigned *unknowns = row_references(instance, unknown, n_unknown, n_seed);
+  unsigned *knowns = unknowns ? row_references(instance, known, n_known, n_result) : NULL;
+  double *values = knowns ? malloc((n_seed + n_result + 1) * sizeof *values) : NULL;
+  hxStatus status = HX_INVALID_ARGUMENT;
+  if (values) {
+    status = hx_instance_adjoint(instance, unknowns, n_seed, knowns, n_result, seed, values,
+                                 values + n_seed);
+    if (status == HX_OK) memcpy(result, values + n_seed, n_result * sizeof *result);
+  }
+  free(values);
   free(knowns);
   free(unknowns);
   return status;

@@ -39,6 +39,7 @@ static const char *mode_name(int mode) {
   if (mode == HX_MODE_INITIALIZATION) return "in initialization mode";
   if (mode == HX_MODE_EVENT) return "in event mode";
   if (mode == HX_MODE_CONTINUOUS) return "in continuous-time mode";
+  if (mode == HX_MODE_INTERMEDIATE) return "in an intermediate update";
   return mode == HX_MODE_STEP ? "between steps" : "after termination";
 }
 

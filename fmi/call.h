@@ -33,10 +33,10 @@ enum {
     EITHER)                                                                                        \
   X(TERMINATE, Terminate, Terminate, RUNNING | HX_MODE_TERMINATED, EITHER)                         \
   X(RESET, Reset, Reset, ANY_MODE, EITHER)                                                         \
-  X(GET_REALS, GetReal, GetFloat64, ANY_MODE, EITHER)                                              \
-  X(GET_INTEGERS, GetInteger, GetInt64, ANY_MODE, EITHER)                                          \
-  X(GET_BOOLEANS, GetBoolean, GetBoolean, ANY_MODE, EITHER)                                        \
-  X(SET_REALS, SetReal, SetFloat64, BEFORE_END, EITHER)                                            \
+  X(GET_REALS, GetReal, GetFloat64, ANY_MODE | HX_MODE_INTERMEDIATE, EITHER)                       \
+  X(GET_INTEGERS, GetInteger, GetInt64, ANY_MODE | HX_MODE_INTERMEDIATE, EITHER)                   \
+  X(GET_BOOLEANS, GetBoolean, GetBoolean, ANY_MODE | HX_MODE_INTERMEDIATE, EITHER)                 \
+  X(SET_REALS, SetReal, SetFloat64, BEFORE_END | HX_MODE_INTERMEDIATE, EITHER)                     \
   X(SET_INTEGERS, SetInteger, SetInt64, BEFORE_END, EITHER)                                        \
   X(SET_BOOLEANS, SetBoolean, SetBoolean, BEFORE_END, EITHER)                                      \
   X(GET_STATE, GetFMUstate, GetFMUState, ANY_MODE, EITHER)                                         \
@@ -45,9 +45,12 @@ enum {
   X(STATE_SIZE, SerializedFMUstateSize, SerializedFMUStateSize, ANY_MODE, EITHER)                  \
   X(SERIALIZE, SerializeFMUstate, SerializeFMUState, ANY_MODE, EITHER)                             \
   X(DESERIALIZE, DeSerializeFMUstate, DeserializeFMUState, ANY_MODE, EITHER)                       \
-  X(DIRECTIONAL, GetDirectionalDerivative, GetDirectionalDerivative, INITIALIZED, EITHER)          \
+  X(DIRECTIONAL, GetDirectionalDerivative, GetDirectionalDerivative,                               \
+    INITIALIZED | HX_MODE_INTERMEDIATE, EITHER)                                                    \
+  X(ADJOINT, None, GetAdjointDerivative, INITIALIZED | HX_MODE_INTERMEDIATE, EITHER)               \
   X(SET_INPUT_RATES, SetRealInputDerivatives, None, BEFORE_END, CO_SIMULATION)                     \
-  X(GET_OUTPUT_RATES, GetRealOutputDerivatives, GetOutputDerivatives, AFTER_STEP, CO_SIMULATION)   \
+  X(GET_OUTPUT_RATES, GetRealOutputDerivatives, GetOutputDerivatives,                              \
+    AFTER_STEP | HX_MODE_INTERMEDIATE, CO_SIMULATION)                                              \
   X(DO_STEP, DoStep, DoStep, MODE_STEP, CO_SIMULATION)                                             \
   X(GET_STATUS, GetXXXStatus, None, ANY_MODE, CO_SIMULATION)                                       \
   X(ENTER_STEP_MODE, None, EnterStepMode, MODE_EVENT, CO_SIMULATION)                               \

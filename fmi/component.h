@@ -75,9 +75,10 @@ typedef struct hxContinuous {
   /* The importer's solver has completed a step to the present state. */
   void (*completed)(hxComponent *component, const struct hxVariables *variables);
 
-  /* As hx_component_step, but sets *event to whether discrete variables changed. With stop the step
-   * ends where they first do; a further step to the same end under the same input then gives, bit
-   * for bit, the result of the step without stop. */
+  /* As hx_component_step, but sets *event to whether discrete variables changed. With stop = 1 the
+   * step ends where they first do, with 2 at the end of each step of the solver; further steps to
+   * the same end under the same input then give, bit for bit, the result of the step without stop.
+   */
   hxStatus (*step)(hxComponent *component, const struct hxVariables *variables, double t_end,
                    int stop, int *event);
 
@@ -91,7 +92,9 @@ typedef struct hxContinuous {
   /* Handles an event; returns whether the states changed. */
   int (*update)(hxComponent *component, struct hxVariables *variables);
 
-  /* Calculates derivatives of output and rate along a change of input and state. */
+  /* Calculates derivatives of output and rate along a change of input, state and tunable
+   * parameters.
+   */
   hxStatus (*tangent)(hxComponent *component, const struct hxVariables *variables,
                       const struct hxVariables *change, struct hxVariables *result);
 

@@ -119,17 +119,19 @@ static size_t state_index(unsigned reference) {
   return i;
 }
 
-/* the address of an input's or a continuous state's change; for others logs and returns NULL */
+/* the address of the change of an input, a continuous state or a tunable parameter; for others logs
+ * and returns NULL */
 static double *known_place(hxInstance *instance, unsigned reference, struct hxVariables *change) {
   hxCausality causality;
   const hxVariable *variable = hx_variable_of_type(instance, HX_REAL, reference, &causality);
   const size_t state = state_index(reference);
   if (!variable) return NULL;
-  if (causality == HX_INPUT) return hx_variable_place(change, variable);
+  if (causality == HX_INPUT || (causality == HX_PARAMETER && variable->tunable))
+    return hx_variable_place(change, variable);
   if (state < hx_state_count) return state_of(change) + state;
   hx_log(instance, HX_LOG_ERROR,
-         "directional derivative: got the known %s, expected an input or a continuous state; "
-         "nothing was done",
+         "directional derivative: got the known %s, expected an input, a continuous state or a "
+         "tunable parameter; nothing was done",
          variable->name);
   return NULL;
 }
@@ -221,6 +223,22 @@ hxStatus hx_instance_directional(hxInstance *instance, const unsigned unknown[],
   if (status == HX_OK) status = check_parameters(instance);
   if (status == HX_OK) status = hx_instance_refresh(instance, 0, 0);
   return status == HX_OK ? differentiate(instance, &direction, 0, unknown, n_unknown, result)
+                         : status;
+}
+
+/* Column by column: a column costs as much as a directional derivative, and its numbers are those
+ * of it. value: memory for n_unknown numbers. */
+hxStatus hx_instance_adjoint(hxInstance *instance, const unsigned unknown[], size_t n_unknown,
+                             const unsigned known[], size_t n_known, const double seed[],
+                             double value[], double result[]) {
+  const double one = 1.0;
+  hxStatus status = HX_OK;
+  for (size_t i = 0; i < n_known && status == HX_OK; i++) {
+    status = hx_instance_directional(instance, unknown, n_unknown, &known[i], 1, &one, value);
+    result[i] = 0.0;
+    for (size_t k = 0; k < n_unknown && status == HX_OK; k++) result[i] += seed[k] * value[k];
+  }
+  return status == HX_OK ? hx_instance_check_finite(instance, result, n_known, "adjoint derivative")
                          : status;
 }
 

@@ -1,12 +1,15 @@
 /* fmi3.c - every function of FMI 3.0, in the standard's order. */
 #include "fmi/call.h"
 
+#include <stdlib.h>
+
 #include "fmi3Functions.h"
 
 typedef struct fmi3InstanceData {
   hxInstance base; /* first: a pointer to it is a pointer to this */
   fmi3InstanceEnvironment environment;
   fmi3LogMessageCallback log;
+  fmi3IntermediateUpdateCallback intermediate; /* NULL: there are no intermediate updates */
 } fmi3InstanceData;
 
 _Static_assert(sizeof(fmi3Float64) == sizeof(double) &&
@@ -87,7 +90,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
                             : refuse_kind(instance, "model exchange");
 }
 
-/* There are no intermediate updates, so the variables required for them are ignored. */
+/* All variables may be read in an intermediate update, whatever is required. */
 fmi3Instance fmi3InstantiateCoSimulation(
     fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath,
     fmi3Boolean visible, fmi3Boolean loggingOn, fmi3Boolean eventModeUsed,
@@ -96,11 +99,11 @@ fmi3Instance fmi3InstantiateCoSimulation(
     fmi3LogMessageCallback logMessage, fmi3IntermediateUpdateCallback intermediateUpdate) {
   fmi3InstanceData *instance =
       new_instance(HX_CO_SIMULATION, instanceName, loggingOn, instanceEnvironment, logMessage);
-  (void)visible, (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables,
-      (void)intermediateUpdate;
+  (void)visible, (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables;
   if (instance) {
     instance->base.uses_event_mode = eventModeUsed && hx_continuous;
     instance->base.may_return_early = earlyReturnAllowed;
+    instance->intermediate = hx_continuous ? intermediateUpdate : NULL;
   }
   return open_instance(instance, instantiationToken, resourcePath);
 }
@@ -280,9 +283,10 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unk
                                     size_t nUnknowns, const fmi3ValueReference knowns[],
                                     size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
                                     fmi3Float64 sensitivity[], size_t nSensitivity) {
-  (void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns, (void)seed, (void)nSeed,
-      (void)sensitivity, (void)nSensitivity;
-  return hx_call_not_offered(c, __func__);
+  if (!hx_call_is_legal_with(c, HX_ADJOINT, nUnknowns, unknowns, seed)) return fmi3Error;
+  if (!hx_call_has_arrays(c, HX_ADJOINT, nKnowns, knowns, sensitivity)) return fmi3Error;
+  return hx_reply(hx_arrays_adjoint(c, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed,
+                                    sensitivity, nSensitivity));
 }
 
 /* ----------------------------------------------------------------------------------------------
@@ -422,6 +426,37 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[
   return hx_reply(hx_arrays_get_output_rates(c, vr, nvr, value, n));
 }
 
+/* Lets the importer read outputs and set inputs where a step of the solver has ended. Sets *end to
+ * where the importer asks to return early. */
+static void update_intermediate(fmi3InstanceData *instance, double *end) {
+  hxInstance *base = &instance->base;
+  const double now = hx_instance_time(base);
+  fmi3Boolean requested = 0;
+  fmi3Float64 early = now;
+  base->state.mode = HX_MODE_INTERMEDIATE;
+  instance->intermediate(instance->environment, now, 1, 1, 1, base->may_return_early != 0,
+                         &requested, &early);
+  base->state.mode = HX_MODE_STEP;
+  if (requested && base->may_return_early && early < *end) *end = early > now ? early : now;
+}
+
+/* Steps from t to *end, with an intermediate update after each step of the solver before it. */
+static hxStatus step_in_parts(fmi3InstanceData *instance, double t, double *end, int *event) {
+  hxInstance *base = &instance->base;
+  void *before = NULL;
+  hxStatus status = hx_instance_save(base, &before);
+  for (double now = t; status == HX_OK && now < *end; now = hx_instance_time(base)) {
+    int found = 0;
+    status = hx_instance_step_to_event(base, now, *end - now, 2, &found);
+    *event |= found;
+    if (found && base->may_return_early) break;
+    if (status == HX_OK && hx_instance_time(base) < *end) update_intermediate(instance, end);
+  }
+  if (status != HX_OK && before) hx_instance_restore(base, before);
+  free(before);
+  return status;
+}
+
 /* Returns early where discrete variables change, if the importer allows it; requests event mode, if
  * the importer uses it. */
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint,
@@ -431,15 +466,18 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint,
                       fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
   hxInstance *instance = c;
   const double t = currentCommunicationPoint, h = communicationStepSize;
+  double end = t + h;
   int event = 0;
   (void)noSetFMUStatePriorToCurrentPoint;
   if (!hx_call_is_legal(c, HX_DO_STEP)) return fmi3Error;
   const hxStatus status =
-      hx_instance_step_to_event(instance, t, h, instance->may_return_early, &event);
+      ((fmi3InstanceData *)c)->intermediate
+          ? step_in_parts(c, t, &end, &event)
+          : hx_instance_step_to_event(instance, t, h, instance->may_return_early, &event);
   const double reached = hx_instance_time(instance);
   set_flag(eventHandlingNeeded, event && instance->uses_event_mode);
   set_flag(terminateSimulation, 0);
-  set_flag(earlyReturn, event && reached < t + h);
+  set_flag(earlyReturn, (event || end < t + h) && reached < t + h);
   if (lastSuccessfulTime) *lastSuccessfulTime = reached;
   return hx_reply(status);
 }

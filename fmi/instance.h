@@ -27,7 +27,8 @@ typedef enum hxMode {
   HX_MODE_STEP = 4, /* co-simulation */
   HX_MODE_TERMINATED = 8,
   HX_MODE_EVENT = 16,
-  HX_MODE_CONTINUOUS = 32 /* model exchange */
+  HX_MODE_CONTINUOUS = 32,  /* model exchange */
+  HX_MODE_INTERMEDIATE = 64 /* within a step of FMI 3 */
 } hxMode;
 
 typedef enum hxInterface { HX_CO_SIMULATION = 1, HX_MODEL_EXCHANGE = 2 } hxInterface;
@@ -199,7 +200,7 @@ void hx_instance_reset(hxInstance *instance);
  * step.c */
 
 /* A step from t to t + h [s]. hx_instance_step_to_event sets *event to whether discrete variables
- * changed; with stop it ends where they first do (see component.h). */
+ * changed; with stop it ends earlier (see component.h). */
 hxStatus hx_instance_step(hxInstance *instance, double t, double h);
 hxStatus hx_instance_step_to_event(hxInstance *instance, double t, double h, int stop, int *event);
 
@@ -226,10 +227,16 @@ hxStatus hx_instance_completed_step(hxInstance *instance);
 hxStatus hx_instance_update(hxInstance *instance, int *states_changed);
 
 /* Exact derivatives of unknowns (outputs, rates) along a change of knowns (inputs, continuous
- * states). */
+ * states, tunable parameters). */
 hxStatus hx_instance_directional(hxInstance *instance, const unsigned unknown[], size_t n_unknown,
                                  const unsigned known[], size_t n_known, const double change[],
                                  double result[]);
+
+/* Sums of the derivatives of unknowns times their seeds, by each known; value: memory for n_unknown
+ * numbers. */
+hxStatus hx_instance_adjoint(hxInstance *instance, const unsigned unknown[], size_t n_unknown,
+                             const unsigned known[], size_t n_known, const double seed[],
+                             double value[], double result[]);
 
 /* Time derivatives of outputs [1/s]. */
 hxStatus hx_instance_get_output_rates(hxInstance *instance, const unsigned reference[], size_t n,
@@ -259,6 +266,9 @@ hxStatus hx_arrays_set(hxInstance *instance, hxType type, const unsigned referen
 hxStatus hx_arrays_directional(hxInstance *instance, const unsigned unknown[], size_t n_unknown,
                                const unsigned known[], size_t n_known, const double change[],
                                size_t n_change, double result[], size_t n_result);
+hxStatus hx_arrays_adjoint(hxInstance *instance, const unsigned unknown[], size_t n_unknown,
+                           const unsigned known[], size_t n_known, const double seed[],
+                           size_t n_seed, double result[], size_t n_result);
 hxStatus hx_arrays_get_output_rates(hxInstance *instance, const unsigned reference[], size_t n,
                                     double rate[], size_t n_rate);
 

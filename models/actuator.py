@@ -88,8 +88,7 @@ def servo_slopes(
     wanted = kp * (angle_ref - angle) + kd * (speed_ref - speed) + torque_ref
     if servo.drive == "motor":
         given = power if servo.mode != "torque" else replace(power, supply=1.0)
-        gains = kp * given.supply, kd * given.supply
-        return _motor_slopes(servo, speed, wanted * given.supply, *gains, power)
+        return _motor_slopes(servo, speed, wanted * given.supply, given)
     load = speed / servo.speed_max
     lower, upper = torque_limits(servo, speed, power.strength)
     torque = np.clip(wanted, lower, upper)
@@ -99,16 +98,20 @@ def servo_slopes(
     return np.where(free, kp, 0.0), np.where(free, kd, line)
 
 
-def _motor_slopes(
-    servo: Servo, speed: Array, wanted: Array, kp: float, kd: float, power: Power
-) -> tuple[Array, Array]:
+def _motor_slopes(servo: Servo, speed: Array, wanted: Array, power: Power) -> tuple[Array, Array]:
     """Returns minus the derivatives of `motor_torque`: by angle [N m/rad], by speed [N m s/rad]."""
     stall, brake = stall_torque(servo) * power.limit, back_emf_damping(servo)
+    kp, kd = (gain * power.supply for gain in feedback_gains(servo))
     voltage_driven = 0.0 if servo.mode == "torque" else brake
     torque = wanted - voltage_driven * speed
-    low, high = (power.strength * (side * stall - brake * speed) for side in (-1.0, 1.0))
+    low, high = (side * stall - brake * speed for side in (-1.0, 1.0))
+    most = servo.torque_constant * servo.current_max if servo.current_max > 0.0 else 1e300
+    low, high = (power.strength * np.clip(side, low, high) for side in (-most, most))
     free = (low < torque) & (torque < high)
-    damping = np.where(free, kd + voltage_driven, brake * power.strength)
+    # a torque that the current limits does not depend on the speed
+    falling = np.abs(np.clip(torque, low, high)) < most * np.asarray(power.strength)
+    on_limit = np.where(falling, brake * power.strength, 0.0)
+    damping = np.where(free, kd + voltage_driven, on_limit)
     return np.where(free, kp, 0.0), damping
 
 

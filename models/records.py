@@ -171,6 +171,13 @@ class Servo:
     # how commands reach the servos, but in kinematic mode: transmissions, rounding of angles
     bus_period: Annotated[float, Number("s", at_least=0.0, at_most=1e3)] = 0.0
     command_step: Annotated[float, Number("rad", at_least=0.0, at_most=1.0)] = 0.0
+    # what a firmware limits besides the duty (eq. 48, 58, 59); 0: it does not
+    current_max: Annotated[float, Number("A", at_least=0.0, at_most=1e6)] = 0.0
+    goal_speed_max: Annotated[float, Number("rad/s", at_least=0.0, at_most=1e3)] = 0.0
+    # a duty above overload_duty for overload_time leaves overload_left
+    overload_time: Annotated[float, Number("s", at_least=0.0, at_most=1e3)] = 0.0
+    overload_duty: Annotated[float, Number("1", at_least=1e-6, at_most=1.0)] = 1.0
+    overload_left: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.0
     # gear between rotor and link (eq. 54-56), but in kinematic mode; stiffness 0: rigid
     gear_stiffness: Annotated[float, Number("N m/rad", at_least=0.0, at_most=1e9)] = 0.0
     gear_damping: Annotated[float, Number("N m s/rad", at_least=0.0, at_most=1e6)] = 0.0

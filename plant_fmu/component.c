@@ -232,8 +232,10 @@ static int update(hxComponent *component, struct hxVariables *variables) {
 
 static hxStatus tangent(hxComponent *component, const struct hxVariables *variables,
                         const struct hxVariables *change, struct hxVariables *result) {
-  const hxStatus status = hx_plant_tangent(component->plant, &variables->input, &change->input,
-                                           &change->state, &result->rate, &result->output);
+  const hxParameterChange parameters = {&variables->definition, &change->definition};
+  const hxStatus status =
+      hx_plant_tangent_by(component->plant, &variables->input, &parameters, &change->input,
+                          &change->state, &result->rate, &result->output);
   result->indicator = result->output.depth;
   return status;
 }

@@ -324,10 +324,10 @@ class FootPaths(Stateful):
         rolls = aim - (aim - before.rolled) * (1.0 - blend(tau)[0]) / left
         rolled = np.where(clock.swinging & ~self.met, rolls, before.rolled)
         # a foot stays where it met the ground (C51), or is dropped
-        fixed = self.met | clock.dropped
-        goal = np.where(fixed, self._ground_of(before), goal)
+        fixed, ground = self.met | clock.dropped, self._ground_of(before)
+        goal = np.where(fixed, ground, goal)
         pull = np.where(fixed, 0.0, pull)
         feet = before._replace(
             phase=phase, goal=goal, pull=pull, rolled=rolled, way=way, turn=turn, twist=twist
         )
-        return self._place_feet(feet, self._ground_of(before))
+        return self._place_feet(feet, ground)

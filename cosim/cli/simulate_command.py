@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -44,10 +45,23 @@ def simulate(
     engine: Engine = None,
     json: Json = False,
 ) -> int:
-    """Run one co-simulation: results, metrics, plots. Several controls: a run of each."""
+    """Run one co-simulation: results, metrics, plots. Several controls: a run of each. SCENARIO may
+    be a package (.ssp) of a plant and a controller.
+    """
+    from hexapod_cosim.cosim.cli.packages import read_package
     from hexapod_cosim.cosim.cli.running import RunOptions, Words
     from hexapod_cosim.cosim.cli.simulating import simulate_each
+    from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 
+    if scenario.endswith(".ssp"):
+        with TemporaryFolder("package") as folder:
+            package = read_package(Path(scenario), folder)
+            settings = [*package.settings, *(settings or [])]
+            return simulate(
+                "walk_flat", control or [str(package.controller)], settings, formats,
+                output or Path("out") / Path(scenario).stem, package.plant, gains, accuracy,
+                engine, json,
+            )  # fmt: skip
     given = [*(settings or []), *([f"outputs.formats={formats!r}"] if formats else [])]
     words = Words(control, given, engine=engine, fmu=fmu, gains=gains, accuracy=accuracy)
     options = RunOptions.read(fmu=fmu, gains=gains, engine=engine, runs=1)

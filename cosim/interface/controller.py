@@ -9,7 +9,7 @@ from functools import lru_cache
 from types import SimpleNamespace
 
 from hexapod_cosim.controller import Controller, Gains, Gait, Parts
-from hexapod_cosim.controller.controller import gains_warnings
+from hexapod_cosim.controller.checks import gains_warnings
 from hexapod_cosim.controller.size import requirements_for, sections_for
 from hexapod_cosim.cosim.common.components import CONTROLLER
 from hexapod_cosim.cosim.interface.plant import expand_interface, parameter_values

@@ -26,7 +26,7 @@ from hexapod_cosim.cosim.interface.model_description import (
     stated,
     typed_attributes,
 )
-from hexapod_cosim.cosim.interface.records import Interface
+from hexapod_cosim.cosim.interface.records import Interface, Variable
 
 # capabilities, each tested by tests/fmi/test_fmi3.py
 CAPABILITIES = {
@@ -34,17 +34,20 @@ CAPABILITIES = {
     "canBeInstantiatedOnlyOncePerProcess": "false",
     "canGetAndSetFMUState": "true",
     "canSerializeFMUState": "true",
-    "providesAdjointDerivatives": "false",
     "providesPerElementDependencies": "false",
 }
 MODEL_EXCHANGE = {"needsCompletedIntegratorStep": "true", "providesEvaluateDiscreteStates": "false"}
 CO_SIMULATION = {
     "canHandleVariableCommunicationStepSize": "true",
-    "providesIntermediateUpdate": "false",
-    "canReturnEarlyAfterIntermediateUpdate": "false",
     "providesEvaluateDiscreteStates": "false",
 }
-EVENTS = ("hasEventMode", "mightReturnEarlyFromDoStep")  # of components with events
+# of components with events and steps of their own
+EVENTS = (
+    "hasEventMode",
+    "mightReturnEarlyFromDoStep",
+    "providesIntermediateUpdate",
+    "canReturnEarlyAfterIntermediateUpdate",
+)
 TYPES = {
     "Real": "Float64",
     "Enumeration": "Enumeration",
@@ -104,7 +107,8 @@ def _add_interfaces(root: Element, interface: Interface) -> None:
     has_states = bool(interface.states)
     differentiable = has_states and interface.directional_derivatives
     both = {"modelIdentifier": interface.component.identifier} | CAPABILITIES
-    both |= {"providesDirectionalDerivatives": "true" if differentiable else "false"}
+    for kind in ("Directional", "Adjoint"):
+        both[f"provides{kind}Derivatives"] = "true" if differentiable else "false"
     if has_states:
         SubElement(root, "ModelExchange", both | MODEL_EXCHANGE)
     events = dict.fromkeys(EVENTS, "true" if has_states else "false")
@@ -179,10 +183,17 @@ def _add_variable(
         "start": _starts(array),
         "derivative": derivative_of,
         "reinit": "true" if first.name in interface.reinitialised else None,
+        "intermediateUpdate": "true" if _is_intermediate(first, interface) else None,
     }
     element = SubElement(parent, TYPES[first.type], stated(attributes))
     for size in array.shape:
         SubElement(element, "Dimension", start=str(size))
+
+
+def _is_intermediate(variable: Variable, interface: Interface) -> bool:
+    """Returns whether importers may read or set a variable at steps of the solver."""
+    continuous = variable.variability == "continuous" and variable.type == "Real"
+    return bool(interface.states) and continuous and variable.causality in ("input", "output")
 
 
 def _starts(array: Array) -> str | None:
@@ -219,7 +230,10 @@ def _add_structure(root: Element, interface: Interface, variables: tuple[Array, 
         ("EventIndicator", indicators, interface.depends),
     ):
         for array in arrays_:
-            _add_unknown(structure, title, array, _knowns(array, depends, references))
+            causalities = ("input", "parameter") if title == "InitialUnknown" else ("input",)
+            known = {one.reference for one in variables if one.first.causality in causalities}
+            known |= set() if title == "InitialUnknown" else {one.reference for one in states}
+            _add_unknown(structure, title, array, _knowns(array, depends, references, known))
 
 
 def _arrays_of(
@@ -232,23 +246,25 @@ def _arrays_of(
 
 
 def _knowns(
-    array: Array, depends: Callable[[str], tuple[str, ...] | None], references: Mapping[str, int]
-) -> list[int] | None:
-    """Returns the references of the arrays that some element depends on; None: all."""
+    array: Array,
+    depends: Callable[[str], tuple[str, ...] | None],
+    references: Mapping[str, int],
+    everything: Iterable[int],
+) -> list[int]:
+    """Returns the references of the arrays that some element depends on. All of them are written
+    out, because CasADi reads no unknown without dependencies.
+    """
     found: set[int] = set()
     for element in array.elements:
         knowns = depends(element.name)
         if knowns is None:
-            return None
+            return sorted(everything)
         found |= {references[known] for known in knowns}
     return sorted(found)
 
 
-def _add_unknown(
-    structure: Element, title: str, array: Array, knowns: Iterable[int] | None
-) -> None:
-    """Adds an unknown. Without stated dependencies it depends on all knowns."""
+def _add_unknown(structure: Element, title: str, array: Array, knowns: Iterable[int]) -> None:
+    """Adds an unknown with its dependencies."""
     attributes = {"valueReference": str(array.reference)}
-    if knowns is not None:
-        attributes["dependencies"] = " ".join(map(str, knowns))
+    attributes["dependencies"] = " ".join(map(str, knowns))
     SubElement(structure, title, attributes)

@@ -226,9 +226,11 @@ def _joined(series: Mapping[tuple[str, ...], Series], path: Path) -> Recording:
     time = _seconds(base.times, first)
     names, blocks = ["time"], [time[:, None]]
     for columns, one in series.items():
-        held = columns[0].endswith("_ref")
+        holds = columns[0].endswith("_ref")
         names += columns
-        blocks.append(_at(time, one, first, held=held, turns=columns[-1].endswith("quaternion[4]")))
+        blocks.append(
+            _at(time, one, first, holds=holds, turns=columns[-1].endswith("quaternion[4]"))
+        )
     data = np.hstack(blocks)
     return Recording(tuple(names), data[np.isfinite(data).all(axis=1)])
 
@@ -238,11 +240,11 @@ def _seconds(times: Sequence[int], first: int) -> Array:
     return np.array([(stamp - first) / NANO for stamp in times])
 
 
-def _at(time: Array, series: Series, first: int, *, held: bool, turns: bool) -> Array:
+def _at(time: Array, series: Series, first: int, *, holds: bool, turns: bool) -> Array:
     """Returns readings at other times (rows, columns); NaN before the first one.
 
     first: the stamp [ns] that is time 0.
-    held: whether each holds until the next. turns: whether the last four are quaternions, whose
+    holds: whether each holds until the next. turns: whether the last four are quaternions, whose
     signs are made continuous first.
     """
     times, rows = _seconds(series.times, first), np.array(series.rows)
@@ -252,7 +254,7 @@ def _at(time: Array, series: Series, first: int, *, held: bool, turns: bool) -> 
         rows = rows.copy()
         signs = np.sign(np.sum(rows[1:, -4:] * rows[:-1, -4:], axis=1))
         rows[1:, -4:] *= np.cumprod(np.where(signs < 0.0, -1.0, 1.0))[:, None]
-    if held:
+    if holds:
         places = np.searchsorted(times, time, side="right") - 1
         found = rows[np.maximum(places, 0)].copy()
     else:

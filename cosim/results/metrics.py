@@ -8,7 +8,7 @@ given: one per macro-step in a run, whatever it records. A metric that the recor
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,18 +42,16 @@ PLANNED = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.
 # the last holds all above 0.9
 CONE_TIMES = tuple(vector_names("feet.cone_time", CONE_BINS))
 _CONE_EDGES = np.append(CONE_STARTS, 1.0)
+
+
+def _each(names: Callable[[str], Iterable[str]], *quantities: str) -> tuple[str, ...]:
+    return tuple(name for quantity in quantities for name in names(quantity))
+
+
 # outputs that the plant integrates or tracks for the metrics
 MEASURED_BY_PLANT = (
-    *(
-        name
-        for quantity in ("positive_work", "negative_work", "torque_squared")
-        for name in joint_names(quantity)
-    ),
-    *(
-        name
-        for quantity in ("slip_distance", "peak_force", "landing_rate", "landings")
-        for name in foot_names(quantity)
-    ),
+    *_each(joint_names, "positive_work", "negative_work", "torque_squared"),
+    *_each(foot_names, "slip_distance", "peak_force", "landing_rate", "landings"),
     *CONE_TIMES,
     "energy.residual",
 )
@@ -61,23 +59,15 @@ MEASURED_BY_PLANT = (
 _JUDGED = (
     *vector_names("torso.position"),
     *vector_names("torso.quaternion", 4),
-    "torso.roll",
-    "torso.pitch",
-    "torso.yaw",
+    *("torso.roll", "torso.pitch", "torso.yaw"),
     *joint_names("angle"),
     *MEASURED_BY_PLANT,
-    *(
-        name
-        for quantity in ("normal_force", "tangential_force", "slip_speed", "contact")
-        for name in foot_names(quantity)
-    ),
+    *_each(foot_names, "normal_force", "tangential_force", "slip_speed", "contact"),
     *foot_vector_names("position"),
     *(f"controller.{leg}.{flag}" for flag in FLAGS for leg in LEG_NAMES),
     *PLANNED,
 )
-_JUDGED_BRISTLES = tuple(
-    name for quantity in ("velocity", "bristle") for name in foot_vector_names(quantity)
-)
+_JUDGED_BRISTLES = _each(foot_vector_names, "velocity", "bristle")
 
 
 def metric_columns(*, bristles: bool) -> tuple[str, ...]:

@@ -139,7 +139,7 @@ def _judged_window(view: View) -> JudgedWindow | None:
         return None
     begin, end = time[0] + SKIPPED_CYCLES * period, time[0] + cycles * period
     part = _between(recording, begin, end)
-    turned = held_integral(part.time, part.column("command.yaw_rate"))
+    turned = hold_integral(part.time, part.column("command.yaw_rate"))
     yaw = np.unwrap(part.column("torso.yaw"))
     marks = begin + period * np.arange(cycles - SKIPPED_CYCLES + 1)
     distance, angle = _ways(part, yaw, marks)
@@ -238,8 +238,8 @@ def _masses(names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(name for name in names if name.endswith(".mass"))
 
 
-def held_integral(time: Array, rate: Array) -> Array:
-    """Returns the running integral (rows,) of a rate that is held from each row to the next."""
+def hold_integral(time: Array, rate: Array) -> Array:
+    """Returns the running integral (rows,) of a rate that holds from each row to the next."""
     return np.concatenate([[0.0], np.cumsum(rate[:-1] * np.diff(time))])
 
 
@@ -267,7 +267,7 @@ def commanded_path(recording: Recording, *, heading: float | None = None) -> Arr
     """
     begin = recording.vector("torso.position")[0, :2]
     heading = float(recording.column("torso.yaw")[0]) if heading is None else heading
-    angle = heading + held_integral(recording.time, recording.column("command.yaw_rate"))
+    angle = heading + hold_integral(recording.time, recording.column("command.yaw_rate"))
     vx, vy = recording.column("command.vx"), recording.column("command.vy")
     velocity = (vx * np.cos(angle) - vy * np.sin(angle), vx * np.sin(angle) + vy * np.cos(angle))
-    return begin + np.column_stack([held_integral(recording.time, part) for part in velocity])
+    return begin + np.column_stack([hold_integral(recording.time, part) for part in velocity])

@@ -19,17 +19,20 @@ from hexapod_cosim.cosim.cli.terminal import (
     warn,
 )
 from hexapod_cosim.cosim.results.folder import results_folder
+from hexapod_cosim.extensions.identify.bench.log import GROUPINGS
 from hexapod_cosim.extensions.identify.log import HELD_OUT, read_log
 from hexapod_cosim.extensions.identify.numbers.servo import TERMS, with_friction_model
 from hexapod_cosim.extensions.identify.unknowns import GROUPS
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
 
+SERVO_WORD = "servo"  # before logs of a servo bench
 FOUND = ("servo", "mass", "contact", "sensor")  # without --find
 Logs = Annotated[
     list[Path],
     typer.Argument(
-        metavar="LOG...",
-        help="CSV, Parquet or MCAP files with commands and readings, each from standing still on.",
+        metavar="[servo] LOG...",
+        help="CSV, Parquet or MCAP files with commands and readings, each from standing still on. "
+        "Behind the word servo: JSON logs of one servo on a pendulum bench.",
     ),
 ]
 Find = Annotated[
@@ -49,7 +52,16 @@ Friction = Annotated[
     typer.Option(
         "--friction",
         metavar="|".join(TERMS),
-        help="Friction model of measured servos. Default: the terms of the robot file.",
+        help="Friction model of measured servos. Default: the terms of the robot file; of bench "
+        "logs all are compared.",
+    ),
+]
+HoldOut = Annotated[
+    str,
+    typer.Option(
+        "--hold-out",
+        metavar="|".join(GROUPINGS),
+        help="Of bench logs: which ones are held out together, to judge a fit to the others.",
     ),
 ]
 Workers = Annotated[
@@ -73,11 +85,15 @@ def identify(
     find: Find = None,
     friction: Friction = None,
     held_out: HeldOut = HELD_OUT,
+    hold_out: HoldOut = "gain",
     workers: Workers = None,
     output: Folder = None,
     json: Json = False,
 ) -> None:
     """Find a robot's masses, servos, contacts and sensors from its own logs."""
+    if str(logs[0]) == SERVO_WORD:
+        _identify_servo(logs[1:], robot, friction, hold_out, workers, output, json)
+        return
     # imported only here because they are slow to import
     from hexapod_cosim.cosim.run.worker_pool import processor_count  # noqa: PLC0415
     from hexapod_cosim.extensions.identify import identification, results  # noqa: PLC0415
@@ -115,6 +131,43 @@ def identify(
     show_table(results.ERRORS, results.error_rows(found), right=(2, 3, 4, 5, 6))
     show_text(results.open_text(found))
     show_files(written)
+
+
+def _identify_servo(
+    logs: Sequence[Path],
+    robot: str,
+    friction: str | None,
+    by: str,
+    workers: int | None,
+    output: Path | None,
+    json: bool,
+) -> None:
+    # imported only here because they are slow to import
+    from hexapod_cosim.cosim.run.worker_pool import processor_count  # noqa: PLC0415
+    from hexapod_cosim.extensions.identify.bench import command  # noqa: PLC0415
+
+    if by not in GROUPINGS:
+        raise unknown_name("grouping of logs", by, GROUPINGS, where="--hold-out")
+    words = ["hexapod", "identify", SERVO_WORD, *map(str, logs), "--robot", robot]
+    words += ["--hold-out", by, *(["--friction", friction] if friction else [])]
+    with results_folder(output or Path("out") / "identify") as folder:
+        found = command.identified_servo(
+            logs,
+            load_robot(robot),
+            friction=friction,
+            by=by,
+            workers=workers or processor_count(),
+            progress=(lambda _text: None) if json else _show_step,
+        )
+        folder.begin()
+        files = command.write_servo(found, folder.path, command=shlex.join(words), by=by)
+    if json:
+        show_json({**command.result_table(found), "files": [str(path) for path in files]})
+        return
+    show_table(command.NUMBERS, command.number_rows(found), right=(2, 3, 4))
+    show_table(("held out", *command.ERRORS), command.error_rows(found), right=(1, 2, 3, 4))
+    show_text(command.worth(found, by))
+    show_files(files)
 
 
 def _show_step(text: str) -> None:

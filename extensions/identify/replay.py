@@ -26,6 +26,7 @@ from hexapod_cosim.cosim.results.folder import RESULTS, results_folder
 from hexapod_cosim.cosim.results.recordings import write_recording
 from hexapod_cosim.cosim.scenario.records import default_formats
 from hexapod_cosim.cosim.scenario.tables import with_overrides
+from hexapod_cosim.extensions.identify.bench.log import is_bench_log
 from hexapod_cosim.extensions.identify.experiment import Experiment
 from hexapod_cosim.extensions.identify.log import (
     Log,
@@ -167,7 +168,10 @@ def _page(done: Replay, robot: Robot, command: str, simulated_file: str) -> str:
 
 LogFile = Annotated[
     Path,
-    typer.Argument(metavar="LOG", help="A CSV, Parquet or MCAP file with commands and readings."),
+    typer.Argument(
+        metavar="LOG",
+        help="A CSV, Parquet or MCAP file with commands and readings, or a servo bench's JSON.",
+    ),
 ]
 Parameters = Annotated[
     list[str] | None,
@@ -191,8 +195,11 @@ def replay_command(
 ) -> None:
     """Drive the plant FMU with a recorded log and compare all readings with it."""
     own = load_robot(robot)
-    parameters = fmu_parameters(settings or [])
     words = ["hexapod", "replay", str(log), "--robot", robot]
+    if is_bench_log(log):
+        _replay_bench(log, own, output, shlex.join(words), json)
+        return
+    parameters = fmu_parameters(settings or [])
     words += [word for text in settings or [] for word in ("--set", text)]
     words += ["--fmu", str(fmu)] if fmu else []
     recorded = read_log(log, torso_com=own.torso.com)
@@ -209,6 +216,21 @@ def replay_command(
         show_json({"channels": channels, "warnings": done.warnings, "files": written})
         return
     show_table(COLUMNS, [one.as_row() for one in done.channels], right=(2, 3, 4, 5))
+    show_files(files)
+
+
+def _replay_bench(log: Path, robot: Robot, output: Path | None, command: str, json: bool) -> None:
+    from hexapod_cosim.extensions.identify.bench import command as bench  # noqa: PLC0415
+
+    with results_folder(output or Path("out") / "replay") as folder:
+        with waiting("replaying the log"):
+            done = bench.replayed(log, robot)
+        folder.begin()
+        files = bench.write_replay(done, folder.path, command=command)
+    if json:
+        show_json({"errors": asdict(done.errors), "files": [str(path) for path in files]})
+        return
+    show_table(bench.ERRORS, [bench.error_texts(done.errors)], right=(0, 1, 2, 3))
     show_files(files)
 
 

@@ -1,7 +1,6 @@
 """Writes a page in which the default robot walks without a server: one HTML file.
 
-The page is that of `hexapod live`. Plant, controller and the macro-step of both
-(cosim/master/src/macro_step.c) are inside as a WebAssembly module (wasm/robot.c).
+It is that of `hexapod live`, with plant, controller and their loop as WebAssembly (wasm/robot.c).
 """
 
 from __future__ import annotations
@@ -26,13 +25,9 @@ from hexapod_cosim.models import HexapodError, Robot, load_robot
 
 _TREE = Path(__file__).resolve().parents[2]
 # a module for browsers; all of them have vectors since 2021 or 2023 (Safari)
-BROWSER = Target(
-    "wasm32-wasi",
-    ".wasm",
-    ("-Wl,--export-dynamic", "-Wl,--strip-all", "-Wl,-z,stack-size=1048576"),
-    "generic+simd128+bulk_memory+nontrapping_fptoint",
-    ("-mexec-model=reactor",),
-)
+FEATURES = "generic+simd128+bulk_memory+nontrapping_fptoint"
+LINKED = ("-Wl,--export-dynamic", "-Wl,--strip-all", "-Wl,-z,stack-size=1048576")
+BROWSER = Target("wasm32-wasi", ".wasm", LINKED, FEATURES, ("-mexec-model=reactor",))
 
 
 def write_static_page(path: Path) -> Path:

@@ -52,7 +52,7 @@ def position_gain(servo: Servo, duty_gain: float) -> float:
 class Power:
     """What motors get from their supply, shares of one or of each joint [1] (eq. 52, 53)."""
 
-    supply: float  # voltage over that of the servo
+    supply: Array | float  # voltage over that of the servo
     limit: Array | float  # this times the share of the duty limit that heat leaves
     strength: Array | float = 1.0  # share of its limits that a fault leaves
 
@@ -70,8 +70,11 @@ def motor_torque(servo: Servo, speed: Array, wanted: Array, power: Power = FULL)
     """
     stall, brake = stall_torque(servo) * power.limit, back_emf_damping(servo) * speed
     driven = wanted + brake if servo.mode == "torque" else wanted * power.supply
-    low, high = power.strength * (-stall - brake), power.strength * (stall - brake)
-    return np.asarray(np.clip(driven - brake, low, high))
+    low, high = -stall - brake, stall - brake
+    if np.any(servo.current_max):
+        most = servo.torque_constant * servo.current_max
+        low, high = np.clip(-most, low, high), np.clip(most, low, high)
+    return np.asarray(np.clip(driven - brake, power.strength * low, power.strength * high))
 
 
 def motor_current(servo: Servo, torque: Array) -> Array:
@@ -199,14 +202,46 @@ def supply_power(
     share = duty_share(servo, winding)
     if servo.supply_resistance == 0.0 or servo.mode == "kinematic":
         return Power(1.0, share, strength)
-    brake = back_emf_damping(servo) * speed if servo.mode == "torque" else 0.0
+    back_emf = back_emf_damping(servo) * speed
+    wanted = wanted + back_emf if servo.mode == "torque" else wanted
+    if servo.current_max > 0.0:
+        most = servo.torque_constant * servo.current_max
+        wanted = np.clip(wanted, back_emf - most, back_emf + most)
     per_torque, limit = servo.duty_max / stall_torque(servo), strength * servo.duty_max * share
-    idle = (1.0 - strength) * per_torque * back_emf_damping(servo) * speed  # without a current
-    duty = np.clip((wanted + brake) * per_torque, idle - limit, idle + limit)
+    idle = (1.0 - strength) * per_torque * back_emf  # without a current
+    duty = np.clip(wanted * per_torque, idle - limit, idle + limit)
     ratio = servo.supply_resistance / servo.resistance
     back = servo.torque_constant * float(np.sum(duty * speed)) / servo.voltage
     supply = min(1.0, (1.0 + ratio * back) / (1.0 + ratio * float(np.sum(duty**2))))
     return Power(supply, supply * share, strength)
+
+
+def moved_goal(servo: Servo, setpoint: Array, goal: Array, h: Array | float) -> Array:
+    """Returns the firmware's setpoint [rad] a time h [s] later: it follows the commanded angle at
+    most at `goal_speed_max` (eq. 58), or at once where that is 0.
+    """
+    if not np.any(servo.goal_speed_max):
+        return goal
+    most = servo.goal_speed_max * h
+    return np.asarray(setpoint + np.clip(goal - setpoint, -most, most))
+
+
+def overload_share(
+    servo: Servo, wanted: Array, loaded: Array | float, h: Array | float
+) -> tuple[Array | float, Array | float]:
+    """Returns the share of the duty limit that the overload protection leaves, and how long the
+    wanted duty has been above `overload_duty` after a further time h [s] (eq. 59).
+
+    wanted: torque at standstill, as of `motor_torque` [N m]. loaded: the time before [s], < 0 of a
+    duty below 0. It begins anew where the wanted duty changes its sign.
+    """
+    if servo.overload_time == 0.0:
+        return 1.0, loaded
+    above = np.abs(wanted) >= servo.overload_duty * torque_per_volt(servo) * servo.voltage
+    side = np.sign(wanted)
+    later = np.where(above, side * (np.maximum(side * loaded, 0.0) + h), 0.0)
+    left = servo.overload_left / servo.duty_max
+    return np.where(np.abs(later) > servo.overload_time, left, 1.0), later
 
 
 def held_commands(servo: Servo, time: Array, angle: Array) -> Array:

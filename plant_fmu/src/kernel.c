@@ -23,7 +23,7 @@ const hxKernel *hx_kernel(void) {
 }
 
 size_t hx_scratch_size(void) {
-  size_t size = hx_tangent_scratch();
+  size_t size = hx_derivative_scratch();
   for (const hxKernel *const *kernel = hx_kernels; *kernel; ++kernel)
     if ((*kernel)->scratch > size) size = (*kernel)->scratch;
   return size;

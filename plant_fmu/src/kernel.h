@@ -14,11 +14,17 @@ HX_HIDDEN_BEGIN
 /* Event handling of a call: stop = end at the first touch-down or lift-off; found = there was one.
  */
 typedef struct hxEvents {
-  int stop, found;
+  int stop;                   /* 1: a call ends at an event; 2: at the end of any step */
+  int found, ended;           /* an event; with stop = 2 a step */
   const hxModel *feet;        /* the model with the rows of feet alone */
   int continues;              /* 1: a later part of a call, whose peaks stay */
   hxFootprintLog *footprints; /* that feet leave in soil */
 } hxEvents;
+
+/* Returns whether a call ends here. */
+static inline int hx_ends_here(const hxEvents *events) {
+  return events->stop && (events->found || events->ended);
+}
 
 typedef struct hxKernel {
   const char *name;

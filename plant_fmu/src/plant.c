@@ -30,6 +30,7 @@ double hx_largest(double so_far, const void *first, size_t n) {
 void hx_plant_command(const hxPlant *plant, const hxInput *input, hxCommand *command) {
   hx_command_from_input(command, input, plant->state.time);
   hx_bus_command(command, &plant->model, &plant->state);
+  hx_setpoints(command, &plant->model, &plant->state);
   hx_command_supply(command, &plant->model, &plant->state);
 }
 

@@ -158,6 +158,9 @@ typedef struct hxModel {
   double voltage, duty_max, supply_resistance; /* V, 1, ohm */
   hxHeat heat;
   double bus_period, command_step; /* s, rad  0 in kinematic mode */
+  double current_torque;           /* N m    k_t times the largest current; huge: no limit */
+  double goal_speed;               /* rad/s  of the firmware's setpoints; 0: no limit */
+  double overload_time, overload_torque, overload_left; /* s, N m, 1  eq. 59 */
   double ground_point[3], ground_normal[3];
   double soil[HX_SOIL_SHAPES][HX_SOIL_SIZE]; /* hxSoil of each shape, of the definition */
   double bristle_length;                     /* m  presliding, or shear displacement of the soil */
@@ -188,6 +191,15 @@ typedef struct hxBus {
   double start; /* s  of the first transmission */
   double sent;  /* 1  transmissions since */
 } hxBus;
+
+/* What the servos' firmware remembers, legs innermost. */
+typedef struct hxFirmware {
+  double angle[HX_JOINTS][HX_SLOTS];  /* rad    setpoints at the last command (eq. 58), */
+  double rate[HX_JOINTS][HX_SLOTS];   /* rad/s  their speed since, */
+  double time;                        /* s      and its time */
+  double loaded[HX_JOINTS][HX_SLOTS]; /* s  of a duty above the overload limit (eq. 59), with the
+                                       *    sign of the duty */
+} hxFirmware;
 
 /* State of the contacts. It changes at touch-down and lift-off, plastic depth and nearest points at
  * the end of steps; never within a step. */
@@ -285,17 +297,19 @@ enum { HX_MEASURED_LINES = offsetof(hxMeasured, contact_loss) / (HX_SLOTS * size
 
 typedef struct hxState {
   double time;
-  double next_step;       /* s  step that the error control proposes next */
-  double first_step;      /* s  the same for a call's first step, with new inputs */
-  double stored_at_start; /* J  stored energy at the start of the energy audit */
-  double parameter_work;  /* J  given by changes of parameters since */
-  double call_start;      /* s  start of the call that an event interrupted */
-  double call_input;      /* 1  checksum of its input, a whole number; 0: no such call */
-  double supply;          /* 1  hxCommand.supply and duty of the last call */
+  double next_step;        /* s  step that the error control proposes next */
+  double first_step;       /* s  the same for a call's first step, with new inputs */
+  double stored_at_start;  /* J  stored energy at the start of the energy audit */
+  double parameter_work;   /* J  given by changes of parameters since */
+  double call_start;       /* s  start of the call that an event interrupted */
+  double call_input;       /* 1  checksum of its input, a whole number; 0: no such call */
+  double call_evaluations; /* 1  evaluations before the last call began */
+  double supply;           /* 1  hxCommand.supply and duty of the last call */
   double duty[HX_JOINTS][HX_SLOTS];
   double locked[HX_JOINTS][HX_SLOTS]; /* 1    1: the joint is locked */
   double held[HX_JOINTS][HX_SLOTS];   /* rad  where it was locked */
   hxBus bus;
+  hxFirmware firmware;
   hxPlantMotion motion;
   hxContactState contact;
   double evaluations, steps, rejected, touchdowns;
@@ -324,36 +338,12 @@ static inline void hx_copy_gears(hxMoment *to, const hxMoment *from) {
   memcpy(to->motor_speed, from->motor_speed, sizeof to->motor_speed);
 }
 
-/* Copies the state of contacts on rigid ground: nothing else of it changes there. */
-static inline void hx_copy_rigid_contacts(hxContactState *to, const hxContactState *from) {
-  memcpy(to, from, offsetof(hxContactState, on_soil));
-  memcpy(to->cell, from->cell, sizeof to->cell);
-  memcpy(to->nearest, from->nearest, sizeof to->nearest);
-}
-
-/* Copies the state of the first row of contacts: nothing else of it changes on rigid planes if the
- * model has no other rows. */
-static inline void hx_copy_foot_contacts(hxContactState *to, const hxContactState *from) {
-  memcpy(to->closed, from->closed, sizeof to->closed[0]);
-  memcpy(to->damping, from->damping, sizeof to->damping[0]);
-  memcpy(to->impact_speed, from->impact_speed, sizeof to->impact_speed[0]);
-  memcpy(to->stiffness, from->stiffness, sizeof to->stiffness[0]);
-  memcpy(to->mu, from->mu, sizeof to->mu[0]);
-  memcpy(to->static_rise, from->static_rise, sizeof to->static_rise[0]);
-}
-
 /* Copies the parts of a state that a step of this model changes. */
 static inline void hx_copy_state(const hxModel *model, hxState *to, const hxState *from) {
   const size_t rest = offsetof(hxState, evaluations);
-  const int plain = model->listed == 1 && !model->terrain && !model->has_soil;
   memcpy(to, from,
          model->elastic ? offsetof(hxState, contact) : offsetof(hxState, motion.deflection));
-  if (plain)
-    hx_copy_foot_contacts(&to->contact, &from->contact);
-  else if (!model->has_soil)
-    hx_copy_rigid_contacts(&to->contact, &from->contact);
-  else
-    to->contact = from->contact;
+  to->contact = from->contact;
   memcpy((char *)to + rest, (const char *)from + rest, offsetof(hxState, moment.contact[1]) - rest);
   for (int k = 1; k < model->listed; ++k)
     to->moment.contact[model->row[k]] = from->moment.contact[model->row[k]];

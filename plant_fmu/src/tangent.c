@@ -66,6 +66,14 @@ static void add_direction(hxComplex *numbers, const hxComplex *change, size_t n,
     numbers[i] = hx_complex(hx_re(numbers[i]), hx_tangent_step * (hx_re(change[i]) / scale));
 }
 
+/* Adds a change of real numbers as their imaginary part; returns what follows it. */
+static const double *add_constants(hxComplex *numbers, const double *change, size_t n,
+                                   double scale) {
+  for (size_t i = 0; i < n; ++i)
+    numbers[i] = hx_complex(hx_re(numbers[i]), hx_tangent_step * (change[i] / scale));
+  return change + n;
+}
+
 static double *to_derivatives(const hxComplex *from, size_t n, double scale, double *to) {
   for (size_t i = 0; i < n; ++i) to[i] = hx_im(from[i]) / hx_tangent_step * scale;
   return to + n;
@@ -87,9 +95,11 @@ typedef struct {
 } hxTangentScratch;
 _Static_assert(sizeof(hxWork) >= POINT_END / 2, "the real point lies in the work");
 
-size_t hx_tangent_scratch(void) { return offsetof(hxTangentScratch, point.state.moment); }
+size_t hx_tangent_scratch(void) {
+  return (offsetof(hxTangentScratch, point.state.moment) + 63) / 64 * 64; /* aligned behind it */
+}
 
-void hx_tangent(void *memory, hxCoordinates *d_rate, hxOutput *d_output) {
+void hx_tangent(void *memory, const void *constants, hxCoordinates *d_rate, hxOutput *d_output) {
   hxTangentScratch *scratch = memory;
   hxTangentPoint *point = &scratch->point;
   hxOutput *output = &scratch->output;
@@ -102,6 +112,12 @@ void hx_tangent(void *memory, hxCoordinates *d_rate, hxOutput *d_output) {
                 scale);
   add_direction((hxComplex *)&point->command, (const hxComplex *)&point->d_command,
                 NUMBERS(sizeof point->command), scale);
+  if (constants) {
+    const double *change =
+        add_constants((hxComplex *)&point->model, constants, HX_MODEL_HEAD, scale);
+    change = add_constants(&point->model.stiffness, change, HX_MODEL_TAIL, scale);
+    add_constants((hxComplex *)&point->state.contact, change, HX_CONTACT_SIZE, scale);
+  }
   hx_motion_from_coordinates(&point->model, &point->x, &point->state.motion);
   memset(all, 0, sizeof *all);
   hx_dynamics_evaluate(&point->model, &point->state.contact, &point->command,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from gains import make_gains
 
 from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Measurement, make_gait
 from hexapod_cosim.controller.plane import LEGS, Mask
@@ -16,7 +17,6 @@ from hexapod_cosim.controller.walk.absence import (
 )
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import load_robot
-from tests.support.gains import make_gains
 
 H = 0.005  # s    period
 ROBOT = load_robot("athena")

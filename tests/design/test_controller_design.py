@@ -21,8 +21,8 @@ from hexapod_cosim.controller import (
     make_gait,
     save_gains,
 )
+from hexapod_cosim.controller.checks import gains_warnings
 from hexapod_cosim.controller.comply.paper import Paper, Step
-from hexapod_cosim.controller.controller import gains_warnings
 from hexapod_cosim.controller.design import StandingPlant, design_gains, plot_design
 from hexapod_cosim.controller.design.loci import critical_size, loop_margins
 from hexapod_cosim.controller.design.paper import (

@@ -36,8 +36,8 @@ def test_derivatives_of_many_knowns_are_the_sum_of_each_one_s(running: Plant) ->
     [
         (
             "torso.roll",
-            "servo.kp",
-            "got the known servo.kp, expected an input or a continuous state",
+            "foot.radius",
+            "foot.radius, expected an input, a continuous state or a tunable parameter",
         ),
         ("torso.roll", "torso.roll", "got the known torso.roll"),
         (

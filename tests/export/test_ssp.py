@@ -12,6 +12,7 @@ import pytest
 from feed_through import FOOT, JOINT, make_feed_through
 from fmpy.ssp.ssd import read_ssd
 
+from hexapod_cosim.cosim.cli.packages import read_package
 from hexapod_cosim.cosim.common.plant_files import fmi2_platform
 from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.export.ssp import (
@@ -24,7 +25,7 @@ from hexapod_cosim.cosim.export.ssp import (
 )
 from hexapod_cosim.cosim.interface.descriptions import open_description, read_description
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.errors import FmuError
+from hexapod_cosim.models.errors import FmuError, HexapodError
 from tools.importers.package import run
 
 STEP, STEPS = 0.005, 60  # s
@@ -153,3 +154,21 @@ def test_fmus_of_different_versions_are_refused(fmus: dict[str, Path], tmp_path:
             title="no",
             experiment=EXPERIMENT,
         )
+
+
+def test_a_package_is_read_as_fmus_and_settings_of_a_run(
+    fmus: dict[str, Path], package: Path, tmp_path: Path
+) -> None:
+    found = read_package(package, tmp_path)
+    assert found.plant.read_bytes() == fmus["plant"].read_bytes()
+    assert found.controller.read_bytes() == fmus["controller"].read_bytes()
+    assert found.settings == ["duration=0.3"]  # the values are the default robot's
+
+
+def test_a_package_of_other_components_is_refused_with_what_it_has(
+    fmus: dict[str, Path], tmp_path: Path
+) -> None:
+    other = dict(zip(("robot", "brain"), fmus.values(), strict=True))
+    path = pack(tmp_path, other)
+    with pytest.raises(HexapodError, match=r"robot, brain.*expected a plant and a controller"):
+        read_package(path, tmp_path)

@@ -76,6 +76,8 @@ def test_the_declared_capabilities_are_those_that_are_tested() -> None:
         "canSerializeFMUState",
         "canHandleVariableCommunicationStepSize",
         "mightReturnEarlyFromDoStep",
+        "providesIntermediateUpdate",
+        "canReturnEarlyAfterIntermediateUpdate",
         "hasEventMode",
         "needsCompletedIntegratorStep",
     }

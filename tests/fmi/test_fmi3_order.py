@@ -177,7 +177,6 @@ NOT_OFFERED: tuple[tuple[object, ...], ...] = (
     ("fmi3EvaluateDiscreteStates",),
     ("fmi3GetNumberOfVariableDependencies", ctypes.c_uint(0), None),
     ("fmi3GetVariableDependencies", ctypes.c_uint(0), None, None, None, None, 0),
-    ("fmi3GetAdjointDerivative", None, 0, None, 0, None, 0, None, 0),
     ("fmi3ActivateModelPartition", ctypes.c_uint(0), 0.0),
 )
 

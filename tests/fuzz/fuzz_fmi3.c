@@ -162,10 +162,13 @@ static int serialize(Session *s) {
 
 /* ---- co-simulation ---- */
 
+static fmi3Instance updated; /* that steps */
+
 static int step(Session *s) {
   const double wrong = take(&s->in) > 240 ? take_real(&s->in) : 0.0, t = present_time(s) + wrong;
   fmi3Boolean event, end, early;
   double reached = NAN;
+  updated = present(s);
   const fmi3Status status =
       fmi3DoStep(present(s), t, take_step_size(&s->in), true, &event, &end, &early, &reached);
   REQUIRE(status != fmi3OK || reached == present_time(s));
@@ -194,8 +197,11 @@ static int directional(Session *s) {
   unsigned *unknown = take_references(&s->in, n), *known = take_references(&s->in, m);
   const size_t rows = take_length(&s->in, unknown, n), columns = take_length(&s->in, known, m);
   double *change = take_row(&s->in, known, m, columns), *result = room(rows, sizeof *result);
-  const fmi3Status status =
-      fmi3GetDirectionalDerivative(present(s), unknown, n, known, m, change, columns, result, rows);
+  const fmi3Status status = take(&s->in) % 2
+                                ? fmi3GetAdjointDerivative(present(s), known, m, unknown, n, change,
+                                                           columns, result, rows)
+                                : fmi3GetDirectionalDerivative(present(s), unknown, n, known, m,
+                                                               change, columns, result, rows);
   free(result);
   free(change);
   free(known);
@@ -259,6 +265,7 @@ static int not_offered(Session *s) {
 static int nothing(Session *s) {
   const size_t n = 1 + pick(&s->in, 2);
   fmi3GetDirectionalDerivative(present(s), NULL, n, NULL, n, NULL, n, NULL, n);
+  fmi3GetAdjointDerivative(present(s), NULL, n, NULL, n, NULL, n, NULL, n);
   fmi3GetOutputDerivatives(present(s), NULL, n, NULL, NULL, n);
   fmi3SetContinuousStates(present(s), NULL, hx_state_count + 1);
   fmi3GetFMUState(present(s), NULL);
@@ -308,12 +315,30 @@ static callFunction *const call[] = {enter,
                                      nothing,
                                      log_all};
 
+/* An importer that reads, sets an input and asks to return early, now and then. */
+static void intermediate(fmi3InstanceEnvironment environment, double time, bool settable,
+                         bool readable, bool finished, bool can_return, bool *requested,
+                         double *early) {
+  static unsigned calls;
+  const unsigned first = 0; /* an input of every component */
+  const size_t n = elements(&first, 1);
+  double *value = room(n, sizeof *value);
+  (void)environment, (void)settable, (void)readable, (void)finished;
+  *requested = can_return && ++calls % 3 == 0;
+  *early = time + 1e-4 * (calls % 5);
+  REQUIRE(fmi3GetFloat64(updated, &first, 1, value, n) == fmi3OK);
+  REQUIRE(fmi3SetFloat64(updated, &first, 1, value, n) == fmi3OK);
+  REQUIRE(fmi3Terminate(updated) == fmi3Error);
+  free(value);
+}
+
 static fmi3Instance opened(unsigned kind) {
   return kind % 2 && hx_continuous
              ? fmi3InstantiateModelExchange("fuzz", hx_default_guid, NULL, false, false, NULL,
                                             ignore)
              : fmi3InstantiateCoSimulation("fuzz", hx_default_guid, NULL, false, false, kind & 2,
-                                           kind & 4, NULL, 0, NULL, ignore, NULL);
+                                           kind & 4, NULL, 0, NULL, ignore,
+                                           kind & 8 ? intermediate : NULL);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {

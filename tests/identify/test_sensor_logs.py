@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import root
 from secret_robots import secret_robot
 
-from hexapod_cosim.extensions.identify.fitting.search import ENOUGH
+from hexapod_cosim.extensions.identify.fitting.least_squares import ENOUGH
 from hexapod_cosim.extensions.identify.identification import QUANTILE, identify
 from hexapod_cosim.extensions.identify.results import warnings
 from hexapod_cosim.extensions.identify.start import standing_attitude

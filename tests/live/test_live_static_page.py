@@ -140,6 +140,20 @@ def test_on_a_phone_all_fits_its_width_and_a_button_walks_the_robot(
     phone.context.close()
 
 
+def test_on_a_telephone_on_its_side_the_robot_stands_beside_the_pad(
+    browser: Any, written: Path
+) -> None:
+    phone = opened(browser, written, **{**PHONE, "viewport": {"width": 740, "height": 360}})
+    assert phone.evaluate("document.documentElement.scrollWidth") == 740
+    stage, pad = (phone.locator(name).bounding_box() for name in ("#stage", ".pad"))
+    assert stage["x"] + stage["width"] <= pad["x"]
+    assert max(box["y"] + box["height"] for box in (stage, pad)) <= 360.0
+    # what the controls are, and which one walks, is there from the start
+    assert phone.inner_text("#control-about").startswith("Plays the planned joint angles")
+    assert phone.inner_text("#controls [aria-pressed=true]") == "kinematic"
+    phone.context.close()
+
+
 def test_control_friction_and_place_answer(page: Any) -> None:
     page.click("#controls [data-value=paper]")
     page.wait_for_selector("#controls [data-value=paper][aria-pressed=true]")

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.dynamics import (
     Command,
     accelerations,
@@ -20,15 +19,10 @@ from hexapod_cosim.models.dynamics import (
     masses,
     world_inertias,
 )
-from hexapod_cosim.models.energy import (
-    constraint_errors,
-)
-from hexapod_cosim.models.ground.faces import ground
 from hexapod_cosim.models.kinematics import (
     axis_quaternion,
     body_states,
     cross,
-    joint_angles,
     joint_models,
     joint_speeds,
     quaternion_product,
@@ -97,25 +91,6 @@ def close(a: Any, b: Any, tolerance: float) -> bool:
 
 
 # kinematics
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_bodies_from_joint_angles_satisfy_the_joints_and_give_the_angles_back(name: str) -> None:
-    robot = load_robot(name)
-    rng = np.random.default_rng(2)
-    angle, speed = rng.uniform(-3.0, 3.0, (6, 3)), rng.normal(0.0, 5.0, (6, 3))
-    body = body_states(
-        robot,
-        rng.normal(size=3),
-        rng.normal(size=4),
-        rng.normal(size=3),
-        rng.normal(size=3),
-        angle,
-        speed,
-    )
-    assert max(constraint_errors(robot, body)) < EXACT * 100.0
-    assert close(joint_angles(robot, body), angle, EXACT)
-    assert close(joint_speeds(robot, body), speed, EXACT)
 
 
 # constraints, eq. 2-4
@@ -196,17 +171,3 @@ def test_a_kinematic_drive_gives_the_commanded_acceleration_and_its_multiplier_i
 
 
 # feet on the ground, eq. 14 and 15
-
-
-def test_the_contact_point_is_the_material_point_that_the_foot_presses() -> None:
-    robot = load_robot("athena")
-    robot = replace(robot, terrain=replace(robot.terrain, kind="slope", incline=0.3, heading=1.1))
-    body = random_bodies(robot, 12)
-    free = np.zeros((19, 6))
-    for leg, foot in enumerate(foot_contacts(robot, body)):
-        later, before = (
-            foot_contacts(robot, advanced(body, free, h))[leg].penetration
-            for h in (DIFFERENCE, -DIFFERENCE)
-        )
-        assert (later - before) / (2.0 * DIFFERENCE) == pytest.approx(foot.approach_speed, abs=1e-7)
-        assert ground(robot.terrain, foot.point)[0] == pytest.approx(-foot.penetration, abs=EXACT)

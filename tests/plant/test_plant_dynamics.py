@@ -1,4 +1,4 @@
-"""Tests the O(n) solution of eq. 1 by the C plant against the dense 204 x 204 system and Pinocchio,
+"""Tests the O(n) solution of eq. 1 by the C plant against the dense 204 x 204 system,
 and its linearly implicit form against the dense one.
 """
 
@@ -14,7 +14,6 @@ from mirror import LEGS
 from plant import Plant, inputs, pointer
 from slopes import resting, slopes
 from states import changed, distance, lopsided, random_bodies, random_command
-from test_twin_pinocchio import pinocchio_accelerations
 
 from hexapod_cosim.models import CONTACT_LAWS, Robot, load_robot
 from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force, standing_damping
@@ -23,7 +22,6 @@ from hexapod_cosim.models.dynamics import (
     Command,
     accelerations,
     constraints,
-    joint_torques,
     mass_matrix,
 )
 from hexapod_cosim.models.kinematics import (
@@ -33,7 +31,6 @@ from hexapod_cosim.models.kinematics import (
 from hexapod_cosim.models.records import Array
 
 DENSE = 1e-10  # relative: the error of the dense solution, whose condition number is about 1e6
-PINOCCHIO = 1e-9  # relative: the force of a foot 1e-4 m deep amplifies the rounding of its height
 MODES = ("position", "torque", "kinematic")
 # the high floor keeps the damping low, so that receding feet still press; feet alone touch
 ROBOTS = {
@@ -84,33 +81,6 @@ def test_accelerations_are_those_of_the_dense_system_under_every_law(
     ours = at(core, robot, body).accelerations(command)
     assert distance(ours.dv, dense.dv) < DENSE
     assert distance(ours.multipliers, dense.multipliers) < DENSE
-
-
-@pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
-@pytest.mark.parametrize("mode", ["position", "torque"])
-@pytest.mark.parametrize("terrain", ["flat", "slope"])
-def test_forward_dynamics_agree_with_pinocchio(
-    core: ct.CDLL, robot: Robot, mode: str, terrain: str
-) -> None:
-    robot = changed(
-        robot,
-        servo={"mode": mode},
-        terrain={"kind": terrain, "height": 0.01, "incline": 0.2, "heading": 0.6},
-    )
-    for seed in range(4):
-        body, command = random_bodies(robot, seed), random_command(robot, seed)
-        plant = at(core, robot, body)
-        foot = plant.output(command).foot
-        motor, gear = joint_torques(robot, body, command)
-        push = np.concatenate([command.push_force, command.push_torque])
-        forces = np.stack([foot.position, foot.force], axis=1)
-        dv = plant.accelerations(command).dv
-        theirs = pinocchio_accelerations(robot, body, motor + gear, forces, push)
-        assert np.count_nonzero(foot.normal_force) >= 3
-        assert (
-            distance(np.concatenate([dv[0], constraints(robot, body).G @ dv.ravel()]), theirs)
-            < PINOCCHIO
-        )
 
 
 # the linearly implicit solve: W u + D^T mu = G_v dv + G_x dx, D u = 0, W = M - z G_v - z^2 G_x

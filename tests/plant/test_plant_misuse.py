@@ -146,24 +146,11 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
     ),
     ("gravity", (0.0, 0.0, math.nan), r"gravity\[3\]: got -?nan"),
     (
-        "solver.method",
-        5,
-        r"solver\.step: got 0, expected a fixed step > 0 with this solver\.method",
-    ),
-    (
         "initial.quaternion",
         (0.0, 0.0, 0.0, 0.0),
         r"initial\.quaternion: got 0, expected a quaternion",
     ),
 ]
-
-
-def test_static_friction_is_refused_without_friction(core: ct.CDLL) -> None:
-    plant = midway(core)
-    start = definition(plant.robot)
-    start.friction.law, start.friction.mu_static = 2, 0.8
-    message = r"friction\.mu_static: got 0\.8, expected 0 or friction\.mu with friction\.law none"
-    refused(plant, lambda: plant.reset(start), INVALID_MODEL, message)
 
 
 def test_a_foot_deeper_than_its_radius_at_the_start_is_refused_with_its_name(

@@ -13,7 +13,7 @@ from hexapod_cosim.cosim.common.files import to_json
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.metric_table import shown_metrics
 from hexapod_cosim.cosim.results.support import body_height
-from hexapod_cosim.cosim.results.window import commanded_path, held_integral
+from hexapod_cosim.cosim.results.window import commanded_path, hold_integral
 
 PER_METRE = (
     "slip_per_metre",
@@ -231,6 +231,6 @@ def test_the_commanded_path_turns_with_the_command() -> None:
     walk.set("command.vy", np.where(walk.time < 5.0 - H / 2, 0.0, 0.1))
     path = commanded_path(walk.recording)
     assert path[-1] == pytest.approx([0.5, 0.5])
-    assert held_integral(np.array([0.0, 1.0, 4.0]), np.array([2.0, 5.0, 100.0])) == pytest.approx(
+    assert hold_integral(np.array([0.0, 1.0, 4.0]), np.array([2.0, 5.0, 100.0])) == pytest.approx(
         [0.0, 2.0, 17.0]
     )

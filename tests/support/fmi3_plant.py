@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -36,6 +36,16 @@ class Step(NamedTuple):
     time: float  # s
 
 
+UPDATE = ctypes.CFUNCTYPE(
+    None,
+    ctypes.c_void_p,
+    ctypes.c_double,
+    *[ctypes.c_bool] * 4,
+    ctypes.POINTER(ctypes.c_bool),
+    ctypes.POINTER(ctypes.c_double),
+)
+
+
 class Plant3:
     """An instance of the FMU; `handle` is None when instantiation was refused."""
 
@@ -51,7 +61,11 @@ class Plant3:
         early: bool = False,
         logger: bool = True,
         logging: bool = False,
+        intermediate: Callable[[float], float | None] | None = None,
     ) -> None:
+        """intermediate: is called with the time of an intermediate update, and returns a time at
+        which to return early.
+        """
         self.messages: list[tuple[int, str, str]] = []
         self._logger = _LOGGER(self._log) if logger else _LOGGER()
         self._library = ctypes.CDLL(str(library))
@@ -60,7 +74,11 @@ class Plant3:
         between = {
             "CoSimulation": [ctypes.c_bool(events), ctypes.c_bool(early), None, ctypes.c_size_t(0)],
         }.get(kind, [])
-        after = {"CoSimulation": [None], "ScheduledExecution": [None, None, None]}.get(kind, [])
+        self._intermediate = intermediate
+        self._update = UPDATE(self._on_update) if intermediate else None
+        after = {"CoSimulation": [self._update], "ScheduledExecution": [None, None, None]}.get(
+            kind, []
+        )
         instantiate = getattr(self._library, f"fmi3Instantiate{kind}")
         instantiate.restype = ctypes.c_void_p
         self.handle = instantiate(*texts, *flags, *between, None, self._logger, *after)
@@ -75,6 +93,19 @@ class Plant3:
         trace: TracebackType | None,
     ) -> None:
         self._library.fmi3FreeInstance(ctypes.c_void_p(self.handle))
+
+    def _on_update(
+        self, _environment: int, time: float, settable: bool, readable: bool, finished: bool,
+        can_return: bool, requested: Any, early: Any,
+    ) -> None:  # fmt: skip
+        assert settable
+        assert readable
+        assert finished
+        assert self._intermediate is not None
+        wanted = self._intermediate(time)
+        if wanted is not None:
+            assert can_return
+            requested[0], early[0] = True, wanted
 
     def _log(self, _environment: int, status: int, category: bytes, text: bytes) -> None:
         self.messages.append((status, category.decode(), text.decode()))

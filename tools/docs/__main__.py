@@ -15,7 +15,7 @@ from nbclient import NotebookClient
 from sphinx.cmd.build import main as sphinx
 
 from hexapod_cosim.cosim.cli.extension import extensions_in, loaded
-from tools.docs import validation, variables
+from tools.docs import variables
 from tools.docs.stage import DOCS, ROOT, add_page, pages, write
 
 PYTHON = """# Python
@@ -57,6 +57,8 @@ def build(out: Path, *, work: Path, computed: bool = True) -> int:
     for name, text in generated(work):
         write(work / name, text)
     if computed:
+        from tools.docs import validation  # noqa: PLC0415  needs the packages of the tests
+
         run_notebooks(work / "notebooks")
         validation.fill(work)
     out.mkdir(parents=True, exist_ok=True)

@@ -109,41 +109,6 @@ static void correct_paths(const hxControllerModel *model, const hxControllerInpu
   }
 }
 
-/* Fills the planned loads and the geometry of the present step for the laws (C15 to C20). */
-static void present_step(const hxControllerModel *model, hxControllerState *state,
-                         hxPresentStep *present) {
-  const hxStepPlanner *planner = &model->plan.planner;
-  hxWalkPlan *plan = &state->plan;
-  const hxPlannedStep *now = hx_walk_plan_step(plan, 0);
-  const hxNeighbours motion = hx_walk_plan_motion(plan);
-  const hxControllerOutput *output = &state->output;
-  hxLoadPlan *load = &present->load;
-  double height[HX_LEGS];
-  hxDemand demand;
-  hx_inverse_dynamics_demand(&planner->laws.dynamics, planner->leg, &motion, output->speed_ref,
-                             &now->posture, hx_step_planner_laden(planner, &state->compliant),
-                             &demand);
-  load->overspeed = 0;
-  for (int k = 0; k < HX_LEGS; ++k) {
-    load->feet[k] = hx_plane_add(now->plane[k], now->shift[k]);
-    height[k] = hx_walk_plan_lift(&model->plan, plan, k);
-    load->shares.activation[k] = now->activation[k];
-    load->swinging[k] = plan->paths.clock.swinging[k];
-    load->awaited[k] = plan->paths.clock.awaited[k];
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
-      load->overspeed |= fabs(output->speed_ref[k][joint]) >= planner->leg[k].speed_max;
-    hx_leg_solver_speeds(&planner->leg[k], &now->pose[k], hx_plane(0.0, 0.0), 1.0,
-                         present->climb[k]);
-  }
-  hx_compliant_plan(&planner->laws, &state->compliant, height, now->feet.rise, &demand, load);
-  present->value = now->value;
-  present->posture = &now->posture;
-  present->plane = now->feet.plane;
-  present->torso = now->torso;
-  present->height = now->height;
-  present->rolled = now->feet.rolled;
-}
-
 /* -------------------------------------------------------------------------------- lost legs */
 
 /* Takes legs that are lost out of service, before the present step is planned (C57). */
@@ -154,8 +119,8 @@ static void watch(const hxControllerModel *model, const hxControllerInput *input
   memset(&level, 0, sizeof level);
   level.level = 1;
   hx_sense(input, &level, force);
-  hx_health_step(&model->health, model->plan.planner.leg, input->angle,
-                 (const double (*)[3])force, &state->output, &state->health);
+  hx_health_step(&model->health, model->plan.planner.leg, input->angle, (const double (*)[3])force,
+                 &state->output, &state->health);
   if (!hx_walk_plan_lose(&model->plan, &state->health, &state->output, &state->plan)) return;
   state->regait = 1;
   state->changing = state->back = 0;
@@ -164,9 +129,8 @@ static void watch(const hxControllerModel *model, const hxControllerInput *input
 /* Folds legs out of service away, and takes back one that works again (C58). */
 static void fold(const hxControllerModel *model, const hxControllerInput *input,
                  hxControllerState *state) {
-  const int back =
-      hx_absence_fold(&model->plan.absent, model->plan.planner.leg, input->angle, &state->health,
-                      &state->plan.absence, &state->output);
+  const int back = hx_absence_fold(&model->plan.absent, model->plan.planner.leg, input->angle,
+                                   &state->health, &state->plan.absence, &state->output);
   memcpy(state->output.absent, state->plan.absence.legs, sizeof state->output.absent);
   memcpy(state->output.faulty, state->health.faulty, sizeof state->output.faulty);
   if (back < 0 || state->back) return;
@@ -202,7 +166,8 @@ void hx_controller_tick(const hxControllerModel *model, const hxControllerInput 
   follow_paths(model, state);
   if (model->paper) correct_paths(model, input, state);
   if (planner->compliant) {
-    present_step(model, state, &present);
+    hx_walk_plan_present_step(&model->plan, &state->compliant, state->output.speed_ref,
+                              &state->plan, &present);
     hx_compliant_step(&planner->laws, planner->leg, &present, input, &state->compliant,
                       &state->output);
   }

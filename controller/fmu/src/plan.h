@@ -62,8 +62,8 @@ static inline hxTwist look_ahead(const hxWalkPlanModel *model, const hxCompliant
 /* Places the legs for planned feet. ahead: periods from the present step. */
 static inline void lay_out(const hxWalkPlanModel *model, const hxCompliant *laws,
                            const hxWalkPlan *plan, int64_t ahead, hxPlannedStep *step) {
-  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, &model->absent,
-                          &plan->absence, ahead, step);
+  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, &model->absent, &plan->absence,
+                          ahead, step);
 }
 
 /* Plans to stand in the stance. */
@@ -153,8 +153,8 @@ static inline void hx_walk_plan_advance(const hxWalkPlanModel *model, int comman
   const int64_t next = plan->at + 1;
   int reached = hx_gait_clock_reach(&model->paths.clock, &plan->paths.clock, next);
   for (int k = 0; k < HX_LEGS; ++k)
-    reached &= !hx_foot_paths_down(&model->paths, &plan->paths, &hx_walk_plan_step(plan, 0)->feet,
-                                   k);
+    reached &=
+        !hx_foot_paths_down(&model->paths, &plan->paths, &hx_walk_plan_step(plan, 0)->feet, k);
   plan->has_before = 1;
   plan->has_after = reached && next <= plan->last;
   plan->cut = !reached && next <= plan->last;
@@ -197,8 +197,8 @@ static HX_SELDOM void hx_walk_plan_adopt(hxWalkPlanModel *model, const hxWalkPla
   hx_command_ramp_carry(&model->ramp, &before->ramp, &plan->ramp);
   if (back >= 0) hx_absence_take_back(&model->absent, back, &plan->absence);
   memcpy(plan->paths.clock.absent, plan->absence.legs, sizeof plan->absence.legs);
-  hx_foot_paths_join(&model->paths, &plan->paths, &hx_walk_plan_step(plan, 0)->feet,
-                     &model->absent, &plan->absence, back);
+  hx_foot_paths_join(&model->paths, &plan->paths, &hx_walk_plan_step(plan, 0)->feet, &model->absent,
+                     &plan->absence, back);
   plan->has_after = 0;
   plan->at = 0;
   plan->last = INT64_MAX;
@@ -286,6 +286,40 @@ static inline hxNeighbours hx_walk_plan_motion(hxWalkPlan *plan) {
     return (hxNeighbours){{NULL, &now->masses, NULL}, {NULL, now->pose, NULL}};
   return (hxNeighbours){{&before->masses, &now->masses, &after->masses},
                         {before->pose, now->pose, after->pose}};
+}
+
+/* Fills the planned loads and the geometry of the present step for the laws (C15 to C20). speed: of
+ * the joints [rad/s]. */
+static inline void hx_walk_plan_present_step(const hxWalkPlanModel *model, const hxCompliant *laws,
+                                             double speed[HX_LEGS][HX_JOINTS], hxWalkPlan *plan,
+                                             hxPresentStep *present) {
+  const hxStepPlanner *planner = &model->planner;
+  const hxPlannedStep *now = hx_walk_plan_step(plan, 0);
+  const hxNeighbours motion = hx_walk_plan_motion(plan);
+  hxLoadPlan *load = &present->load;
+  double height[HX_LEGS];
+  hxDemand demand;
+  hx_inverse_dynamics_demand(&planner->laws.dynamics, planner->leg, &motion, speed, &now->posture,
+                             hx_step_planner_laden(planner, laws), &demand);
+  load->overspeed = 0;
+  for (int k = 0; k < HX_LEGS; ++k) {
+    load->feet[k] = hx_plane_add(now->plane[k], now->shift[k]);
+    height[k] = hx_walk_plan_lift(model, plan, k);
+    load->shares.activation[k] = now->activation[k];
+    load->swinging[k] = plan->paths.clock.swinging[k];
+    load->awaited[k] = plan->paths.clock.awaited[k];
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      load->overspeed |= fabs(speed[k][joint]) >= planner->leg[k].speed_max;
+    hx_leg_solver_speeds(&planner->leg[k], &now->pose[k], hx_plane(0.0, 0.0), 1.0,
+                         present->climb[k]);
+  }
+  hx_compliant_plan(&planner->laws, laws, height, now->feet.rise, &demand, load);
+  present->value = now->value;
+  present->posture = &now->posture;
+  present->plane = now->feet.plane;
+  present->torso = now->torso;
+  present->height = now->height;
+  present->rolled = now->feet.rolled;
 }
 
 #endif

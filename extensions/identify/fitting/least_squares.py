@@ -67,10 +67,17 @@ def remaining_step(
 
     It is 0 at an optimum. Numbers at a bound that it would lead beyond stay there.
     """
+    return damped_step(jacobian, residuals, z, bounds, 0.0)
+
+
+def damped_step(
+    jacobian: Array, residuals: Array, z: Array, bounds: tuple[Array, Array], damping: float
+) -> Array:
+    """Returns a step of Levenberg's method. damping: added to the normal matrix's diagonal."""
     bounded = np.clip(residuals, -BOUND, BOUND)
     share = np.sqrt(BOUND / np.maximum(np.abs(residuals), BOUND))
     weighted = jacobian * share[:, None]
-    normal, right = weighted.T @ weighted, jacobian.T @ bounded
+    normal, right = weighted.T @ weighted + damping * np.eye(len(z)), jacobian.T @ bounded
     free = np.ones(len(z), dtype=np.bool_)
     step = np.zeros(len(z))
     for _ in z:
@@ -82,6 +89,34 @@ def remaining_step(
             break
         free &= ~out
     return step
+
+
+# A search ends where Gauss and Newton's next step is this long [deviations]. A relative change of
+# the sum of squares is no measure: of a log of 60 s it is some 100,000, and a number that is wrong
+# by a deviation adds 1.
+ENOUGH = 0.1
+SHORTENED = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, until the sum of squares falls
+SUFFICIENT = 0.1  # share of the fall that derivatives say
+
+
+def stepped(
+    residuals: Callable[[Array], Array], jacobian: Array, z: Array, bounds: tuple[Array, Array]
+) -> tuple[Array | None, float]:
+    """Returns the numbers after a step of Gauss and Newton's method, and its length in deviations.
+
+    jacobian: derivatives of the residuals at z. None where the step is short or no part of it is
+    better.
+    """
+    before = residuals(z)
+    step = remaining_step(jacobian, before, z, bounds)
+    length = float(np.linalg.norm(jacobian @ step))
+    if length >= ENOUGH:
+        cost = huber(before)
+        for share in SHORTENED:
+            moved = np.clip(z + share * step, *bounds)
+            if huber(residuals(moved)) < cost - SUFFICIENT * share * length**2:
+                return moved, length
+    return None, length
 
 
 UNLIKE = 0.5  # difference of slopes to both sides, in the smaller one, beyond which one jumps

@@ -20,7 +20,7 @@ from hexapod_cosim.extensions.identify.fitting.least_squares import (
     FINE,
     huber,
     minimised,
-    remaining_step,
+    stepped,
 )
 from hexapod_cosim.extensions.identify.fitting.misfit import read_noise
 from hexapod_cosim.extensions.identify.fitting.problem import Problem
@@ -35,18 +35,12 @@ SHORT = 6.0  # s    of each log on which the search is made
 # Torques jump when a command comes, so that their sum of squares has a valley between each two
 # commands; the delay of currents and of forces is tried over these values.
 DELAYS_TRIED = 0.001 * np.arange(21.0)  # s
-# The last search ends where Gauss and Newton's next step is this long [deviations]. A relative
-# change of the sum of squares is no measure: of a log of 60 s it is some 100,000, and a number that
-# is wrong by a deviation adds 1.
-ENOUGH = 0.1
 FINISHING = 12  # steps of the last search, at most
 # Readings that jump come and go near the optimum, so that a step is left, if a short one.
 NEAR, SHORTER = 1.0, 0.5  # deviations; of the step before
 # At the first steps all readings count anew. From then on those left out stay so: a search
 # would go back and forth between two points at which different readings count.
 ANEW = 2
-SHORTENED = (1.0, 0.5, 0.25, 0.1, 0.03)  # of a step, until the sum of squares falls
-SUFFICIENT = 0.1  # share of the fall that derivatives say
 
 
 def searched(problem: Problem, report: Progress) -> tuple[Problem, Array]:
@@ -113,25 +107,9 @@ def finished(problem: Problem, z: Array, report: Progress) -> Array:
             problem.counted = problem.known
         problem.set_noise(problem.errors(z))
         problem.leave_out_bent(z, FINE)
-        better, length = _stepped(problem, z)
+        jacobian = problem.jacobian(z, FINE)
+        better, length = stepped(problem.residuals, jacobian, z, problem.bounds())
         if better is None or (length < NEAR and length > SHORTER * before):
             break
         z, before = better, length
     return z
-
-
-def _stepped(problem: Problem, z: Array) -> tuple[Array | None, float]:
-    """Returns the numbers after a step of Gauss and Newton's method, and its length in deviations.
-
-    None where it is short or no part of it is better.
-    """
-    jacobian, residuals = problem.jacobian(z, FINE), problem.residuals(z)
-    step = remaining_step(jacobian, residuals, z, problem.bounds())
-    length = float(np.linalg.norm(jacobian @ step))
-    if length >= ENOUGH:
-        cost = huber(residuals)
-        for share in SHORTENED:
-            moved = np.clip(z + share * step, *problem.bounds())
-            if huber(problem.residuals(moved)) < cost - SUFFICIENT * share * length**2:
-                return moved, length
-    return None, length

@@ -25,10 +25,9 @@ export class LocalLoop extends Listeners implements Connection {
     private readonly setup: StaticSetup,
   ) {
     super();
-    const { first: settings } = setup;
-    const { limits } = setup.walks[settings.gait];
-    const flags = { stopped: true, paused: true, recording: false, recorded: false };
-    this.status = { ...flags, settings, wanted: settings, limits, fault: "" };
+    const { first: settings, walks } = setup;
+    const flags = { stopped: true, paused: true, recording: false, recorded: false, fault: "" };
+    this.status = { ...flags, settings, wanted: settings, limits: walks[settings.gait].limits };
     setTimeout(() => {
       this.emit("world", setup.world);
       this.attempt(() => {
@@ -40,9 +39,7 @@ export class LocalLoop extends Listeners implements Connection {
     });
   }
 
-  watchState(watcher: (state: "open") => void): void {
-    watcher(this.state);
-  }
+  watchState = (watcher: (state: "open") => void): void => watcher(this.state);
 
   /** Does what a message of the page asks for. */
   send({ type, key, value, action, ...input }: Record<string, unknown>): void {
@@ -67,9 +64,8 @@ export class LocalLoop extends Listeners implements Connection {
   }
 
   /** Simulates the time that has passed since the last picture. */
-  private follow(): void {
-    requestAnimationFrame(() => this.follow());
-    const now = performance.now();
+  private follow(now = this.last): void {
+    requestAnimationFrame((next) => this.follow(next));
     const passed = (now - this.last) / 1000;
     this.last = now;
     if (this.status.paused || this.status.fault || passed > LONGEST) return;
@@ -94,8 +90,7 @@ export class LocalLoop extends Listeners implements Connection {
     this.do("gait", ...timing);
     this.do("start", setup.numbers[control], friction);
     Object.assign(status, { settings: status.wanted, limits, fault: "", paused: false });
-    [this.plan, this.due] = [[], 0];
-    this.placed += 1;
+    [this.plan, this.due, this.placed] = [[], 0, this.placed + 1];
     this.emitFrame();
   }
 
@@ -109,16 +104,15 @@ export class LocalLoop extends Listeners implements Connection {
   }
 
   private planChange(gait: string): void {
-    const { status, setup } = this;
-    const { begin, end, limits } = setup.walks[status.settings.gait].changes[gait];
+    const [status, { walks }] = [this.status, this.setup];
+    const { begin, end, limits } = walks[status.settings.gait].changes[gait];
     const [since] = this.row().time;
     const change = () => {
-      this.do("gait", ...setup.walks[gait].gait);
+      this.do("gait", ...walks[gait].gait);
       status.settings = { ...status.settings, gait };
     };
-    const { limits: usual } = setup.walks[gait];
     this.plan = [[since + begin, change]];
-    this.plan.push([since + end, () => Object.assign(status, { limits: usual })]);
+    this.plan.push([since + end, () => Object.assign(status, { limits: walks[gait].limits })]);
     status.limits = limits;
   }
 

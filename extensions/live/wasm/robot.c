@@ -151,10 +151,8 @@ HX_API int hx_page_leg(int leg) {
   return HX_OK;
 }
 
-/* Changes the control while the robot walks. */
+/* Changes the control, or the friction coefficient, while the robot walks. */
 HX_API int hx_page_control(int next) { return hx_controller_change_control(controller, next); }
-
-/* Changes the friction coefficient while the robot walks. */
 HX_API int hx_page_friction(double friction) {
   definition.friction.mu = friction;
   return hx_plant_tune(plant, &definition);

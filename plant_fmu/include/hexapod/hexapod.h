@@ -212,8 +212,9 @@ HX_API hxStatus hx_plant_step_ramp(hxPlant *plant, const hxInput *input, const h
                                    double t_end);
 
 /* Does the same as hx_plant_step and sets *event to whether a foot touched down or lifted off.
- * With stop the call ends at the first such event; hx_plant_time() returns its time. A second call
- * with the same input and end gives, bit for bit, the result of a call without stop. */
+ * With stop = 1 the call ends at the first such event, with 2 at the end of each step of the
+ * solver; hx_plant_time() returns its time. Further calls with the same input and end give, bit for
+ * bit, the result of a call without stop. */
 HX_API hxStatus hx_plant_step_to_event(hxPlant *plant, const hxInput *input, double t_end, int stop,
                                        int *event);
 
@@ -284,6 +285,18 @@ HX_API int hx_plant_update_locks(hxPlant *plant, const hxInput *input);
 HX_API hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input,
                                  const hxCoordinates *dx, hxCoordinates *d_rate,
                                  hxOutput *d_output);
+
+/* A direction of tunable parameters: those in force, and their change, whose whole numbers have no
+ * effect. Coordinates and bristles stay; a law that a parameter of 0 switches off stays off. */
+typedef struct hxParameterChange {
+  const hxDefinition *definition, *change;
+} hxParameterChange;
+
+/* Does the same along a direction of parameters, too (NULL: none). */
+HX_API hxStatus hx_plant_tangent_by(hxPlant *plant, const hxInput *input,
+                                    const hxParameterChange *parameters, const hxInput *d_input,
+                                    const hxCoordinates *dx, hxCoordinates *d_rate,
+                                    hxOutput *d_output);
 
 /* Computes the rates, per second, of outputs that are integrals since the start, at the present
  * time under this input: works, squared torques, slip, impulses, losses. Rates of peaks are 0. */

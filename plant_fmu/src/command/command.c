@@ -35,6 +35,8 @@ static double motor_duty(const hxCommand *command, const hxModel *model, const h
                   model->kd * (command->speed[joint][leg] - w) + command->torque[joint][leg];
   if (model->servo_mode == HX_SERVO_TORQUE) wanted += model->back_emf * w;
   *speed = w;
+  const double most = model->current_torque, back = model->back_emf * w;
+  wanted = fmax(back - most, fmin(back + most, wanted));
   return fmax(free - limit, fmin(free + limit, wanted * model->duty_max / model->stall_torque));
 }
 
@@ -59,6 +61,9 @@ void hx_command_supply(hxCommand *command, const hxModel *model, const hxState *
     for (int slot = 0; slot < HX_SLOTS; ++slot) {
       const double left = (heat->max - state->measured.winding[joint][slot]) * per_kelvin;
       command->duty[joint][slot] = heat->winding > 0.0 ? fmax(0.0, fmin(1.0, left)) : 1.0;
+      if (model->overload_time > 0.0 &&
+          fabs(state->firmware.loaded[joint][slot]) > model->overload_time)
+        command->duty[joint][slot] *= model->overload_left;
     }
   const int sags = model->supply_resistance > 0.0 && model->servo_drive == HX_DRIVE_MOTOR &&
                    model->servo_mode != HX_SERVO_KINEMATIC;
@@ -109,4 +114,48 @@ double hx_bus_end(const hxModel *model, const hxState *state, double t_end) {
   if (!(model->bus_period > 0.0)) return t_end;
   const double next = next_sending(model, state);
   return next > state->time && next < t_end - bus_margin ? next : t_end;
+}
+
+/* ------------------------------------------------------------------------------------- firmware
+ */
+
+void hx_setpoints(hxCommand *command, const hxModel *model, const hxState *state) {
+  const hxFirmware *firmware = &state->firmware;
+  if (!(model->goal_speed > 0.0)) return;
+  for (int i = 0; i < HX_JOINTS * HX_SLOTS; ++i)
+    command->angle[i / HX_SLOTS][i % HX_SLOTS] =
+        firmware->angle[i / HX_SLOTS][i % HX_SLOTS] +
+        firmware->rate[i / HX_SLOTS][i % HX_SLOTS] * (state->time - firmware->time);
+}
+
+void hx_follow_goals(hxCommand *command, const hxModel *model, hxState *state, double t_end,
+                     hxCommand *ramp) {
+  hxFirmware *firmware = &state->firmware;
+  const double most = model->goal_speed, h = t_end - state->time;
+  hxCommand now = *command;
+  if (!(most > 0.0)) return;
+  hx_setpoints(&now, model, state);
+  for (int i = 0; i < HX_JOINTS * HX_SLOTS; ++i) {
+    const int joint = i / HX_SLOTS, slot = i % HX_SLOTS;
+    const double left = command->angle[joint][slot] - now.angle[joint][slot];
+    const double rate = h > 0.0 ? fmax(-most, fmin(most, left / h)) : 0.0;
+    firmware->rate[joint][slot] = ramp->angle[joint][slot] = rate;
+  }
+  memcpy(command->angle, now.angle, sizeof command->angle);
+  memcpy(firmware->angle, now.angle, sizeof firmware->angle);
+  firmware->time = state->time;
+}
+
+void hx_count_overload(const hxCommand *command, const hxModel *model, hxState *state, double h) {
+  if (!(model->overload_time > 0.0)) return;
+  for (int i = 0; i < HX_JOINTS * HX_SLOTS; ++i) {
+    const int joint = i / HX_SLOTS, slot = i % HX_SLOTS;
+    const double wanted =
+        model->kp * (command->angle[joint][slot] - state->moment.angle[joint][slot]) +
+        model->kd * (command->speed[joint][slot] - state->moment.speed[joint][slot]) +
+        command->torque[joint][slot];
+    double *loaded = &state->firmware.loaded[joint][slot];
+    const double side = copysign(1.0, wanted);
+    *loaded = fabs(wanted) >= model->overload_torque ? side * (fmax(side * *loaded, 0.0) + h) : 0.0;
+  }
 }

@@ -43,7 +43,9 @@ static inline hxPower hx_power_of(const hxCommand *command, int joint, int slot)
 static inline hxMotor voltage_motor(const hxModel *model, hxReal speed, hxReal wanted,
                                     hxPower power) {
   const hxReal brake = model->back_emf * speed, stall = model->stall_torque * power.limit;
-  const hxReal high = power.strength * (stall - brake), low = power.strength * (-stall - brake);
+  const hxReal most = hx_splat(model->current_torque);
+  const hxReal high = power.strength * hx_clip(most, -stall - brake, stall - brake),
+               low = power.strength * hx_clip(-most, -stall - brake, stall - brake);
   if (model->servo_mode != HX_SERVO_TORQUE) wanted = wanted * power.supply - brake;
   return (hxMotor){hx_clip(wanted, low, high), wanted, low, high, hx_splat(0.0)};
 }
@@ -71,10 +73,10 @@ static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal
   const hxMotor motor =
       hx_motor_torque(model, angle, speed, angle_ref, speed_ref, torque_ref, power);
   const hxMask free = hx_less(motor.low, motor.wanted) & hx_less(motor.wanted, motor.high);
-  /* falling: the torque is limited by the sloping part of the torque-speed line */
+  /* falling: the torque is limited by the sloping part of the torque-speed line, or the voltage */
   const hxMask falling =
       model->servo_drive == HX_DRIVE_MOTOR
-          ? ~free
+          ? ~free & hx_less(hx_abs(motor.torque), model->current_torque * power.strength)
           : ~free & hx_less(zero, motor.torque * motor.load) & hx_less(hx_abs(motor.load), one);
   const hxReal t = hx_tanh(speed * model->per_gear_speed);
   return (hxServo){

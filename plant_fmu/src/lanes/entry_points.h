@@ -41,6 +41,9 @@ static void kernel_start(const hxModel *model, double t, hxState *state, void *s
   memset(&state->measured, 0, sizeof state->measured);
   memset(&state->bus, 0, sizeof state->bus);
   state->bus.start = t;
+  memset(&state->firmware, 0, sizeof state->firmware);
+  memcpy(state->firmware.angle, state->moment.angle, sizeof state->firmware.angle);
+  state->firmware.time = t;
   for (int i = 0; i < HX_JOINTS * HX_SLOTS; ++i)
     state->measured.winding[i / HX_SLOTS][i % HX_SLOTS] =
         state->measured.housing[i / HX_SLOTS][i % HX_SLOTS] = model->heat.start;

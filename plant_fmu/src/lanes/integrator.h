@@ -305,7 +305,7 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
   double first = fmin(state->first_step,
                       state->next_step); /* new inputs cause a larger error than the last step's */
   double *next_step = command->time < state->time ? &state->next_step : &first;
-  while (state->time < t_end && !(events->stop && events->found)) {
+  while (state->time < t_end && !hx_ends_here(events)) {
     const double left = t_end - state->time;
     double taken;
     int event = 0;
@@ -317,6 +317,7 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
     const double t = state->time + taken;
     state->time = taken >= left || t_end - t < step_floor ? t_end : t;
     events->found |= event;
+    events->ended = events->stop == 2;
     /* a call that is interrupted here continues without patches: the whole call does so, too */
     for (int pack = 0; event && pack < HX_PACKS; ++pack) hx_forget_patches(&scratch->nodes[pack]);
   }
@@ -338,7 +339,7 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const 
              model->step, count, allowed);
     return HX_STEP_TOO_SMALL;
   }
-  for (double i = 1.0; i <= count && !(events->stop && events->found); i += 1.0) {
+  for (double i = 1.0; i <= count && !hx_ends_here(events); i += 1.0) {
     const double t = i < count ? t_start + (t_end - t_start) * (i / count) : t_end;
     const hxStatus status = run_to(model, command, ramp, t, events, state, scratch, message);
     if (status != HX_OK) return status;
@@ -351,8 +352,9 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const 
 static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
                              double t_end, hxEvents *events, hxState *state, void *scratch,
                              char *message) {
+  if (command->time == state->time) state->call_evaluations = state->evaluations;
   ((hxScratch *)scratch)->last_evaluation =
-      state->evaluations + evaluations_allowed(model, t_end - command->time);
+      state->call_evaluations + evaluations_allowed(model, t_end - command->time);
   for (int pack = 0; pack < HX_PACKS; ++pack) hx_forget_nodes(&((hxScratch *)scratch)->nodes[pack]);
   ((hxScratch *)scratch)->is_soil_known = 0;
   if (state->moment.stale != 0.0) hx_moment_update(model, state);

@@ -60,9 +60,23 @@ typedef struct {
   double fingerprint, start;
 } hxStepCall;
 
-/* Sets a part's command, and in *ramp its change per second; servos on a bus hold theirs. */
-static void part_command(hxPlant *plant, const hxStepCall *call, int resumes, hxCommand *command,
+/* Lets setpoints follow a part's command until t_end, s; a part that resumes another goes on. */
+static void follow_goals(hxPlant *plant, int resumes, double t_end, hxCommand *command,
                          hxCommand *ramp) {
+  const hxFirmware *firmware = &plant->state.firmware;
+  if (!(plant->model.goal_speed > 0.0)) return;
+  if (!resumes) {
+    hx_follow_goals(command, &plant->model, &plant->state, t_end, ramp);
+    return;
+  }
+  memcpy(command->angle, firmware->angle, sizeof command->angle);
+  memcpy(ramp->angle, firmware->rate, sizeof ramp->angle);
+}
+
+/* Sets a part's command, and in *ramp its change per second; servos on a bus hold theirs. Returns
+ * the part's end, at most t_end, s. */
+static double part_command(hxPlant *plant, const hxStepCall *call, int resumes, double t_end,
+                           hxCommand *command, hxCommand *ramp) {
   enum { SIZE = sizeof(hxCommand) / sizeof(double) };
   hxState *state = &plant->state;
   const double elapsed = state->time - call->start;
@@ -77,7 +91,10 @@ static void part_command(hxPlant *plant, const hxStepCall *call, int resumes, hx
     memset(ramp->speed, 0, sizeof ramp->speed);
     memset(ramp->torque, 0, sizeof ramp->torque);
   }
+  const double end = hx_bus_end(&plant->model, state, t_end);
+  follow_goals(plant, resumes, end, command, ramp);
   supply_motors(plant, resumes, command);
+  return end;
 }
 
 /* Advances the plant by a part of a call: to its end, or to the next transmission of the bus. If an
@@ -89,12 +106,14 @@ static hxStatus advance_part(hxPlant *plant, const hxStepCall *call, double t_en
   hxCommand command, ramp;
   const int resumes = state->call_input != 0.0 && state->call_input == call->fingerprint &&
                       state->call_start < state->time;
+  const int moves = call->ramp || plant->model.goal_speed > 0.0;
+  const double begin = state->time;
+  memset(&ramp, 0, sizeof ramp);
   if (call->ramp) ramp = *call->ramp;
-  part_command(plant, call, resumes, &command, &ramp);
-  const double end = hx_bus_end(&plant->model, state, t_end);
-  const hxStatus status =
-      hx_kernel()->integrate(&plant->model, &command, call->ramp ? &ramp : NULL, end, events, state,
-                             plant->scratch, plant->message);
+  const double end = part_command(plant, call, resumes, t_end, &command, &ramp);
+  const hxStatus status = hx_kernel()->integrate(&plant->model, &command, moves ? &ramp : NULL, end,
+                                                 events, state, plant->scratch, plant->message);
+  hx_count_overload(&command, &plant->model, state, state->time - begin);
   const int interrupted = state->time < end;
   state->call_input = interrupted ? call->fingerprint : 0.0;
   state->call_start = interrupted ? command.time : 0.0;
@@ -125,7 +144,7 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   do {
     status = advance_part(plant, &call, t_end, events);
     events->continues = 1;
-  } while (status == HX_OK && plant->state.time < t_end && !(events->stop && events->found));
+  } while (status == HX_OK && plant->state.time < t_end && !hx_ends_here(events));
   if (status == HX_OK) return HX_OK;
   hx_copy_state(&plant->model, &plant->state, before);
   if (locks) hx_plant_derive_stops(plant);

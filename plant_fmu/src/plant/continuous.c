@@ -5,7 +5,6 @@
 #include "../contact_law.h"
 #include "../kernel.h"
 #include "../robot/robot.h"
-#include "../tangent.h"
 #include "parts.h"
 
 static const hxCommand no_command;
@@ -129,38 +128,6 @@ int hx_plant_update_contacts(hxPlant *plant) {
   hx_footprints_begin(&plant->footprints);
   hx_kernel()->switch_contacts(model, &depths, &plant->footprints, &plant->state);
   return memcmp(before, plant->state.motion.bristle, sizeof before) != 0;
-}
-
-hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input,
-                          const hxCoordinates *dx, hxCoordinates *d_rate, hxOutput *d_output) {
-  static const hxInput no_input;
-  static const hxCoordinates no_change;
-  const double scale =
-      hx_largest(hx_largest(0.0, d_input, sizeof *d_input / sizeof(double)), dx, HX_COORDINATES);
-  if (plant->model.elastic) return hx_refuse_elastic_gears(plant->message);
-  if (!isfinite(scale))
-    return hx_plant_fail(
-        plant, HX_INVALID_ARGUMENT,
-        "derivatives: got a direction that is not finite, expected finite numbers");
-#if HX_HAS_TANGENT
-  hxTangentPoint *point = plant->scratch;
-  hxCoordinates x;
-  hx_plant_get_coordinates(plant, &x); /* before the point, because it uses the same memory */
-  hx_plant_command(plant, input, &point->command);
-  hx_command_from_input(&point->d_command, d_input ? d_input : &no_input, 0.0);
-  point->x = x;
-  point->dx = dx ? *dx : no_change;
-  point->model = plant->model;
-  memcpy(&point->state, &plant->state, offsetof(hxState, moment));
-  point->scale = scale > 0.0 ? scale : 1.0;
-  hx_tangent(point, d_rate, d_output);
-  return HX_OK;
-#else
-  return hx_plant_fail(
-      plant, HX_INVALID_ARGUMENT,
-      "derivatives: got a call in a binary without complex numbers, expected another "
-      "compiler's binary; build the plant with gcc or clang");
-#endif
 }
 
 void hx_plant_integral_rates(hxPlant *plant, const hxInput *input, hxOutput *rate) {

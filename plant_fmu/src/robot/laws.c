@@ -87,6 +87,11 @@ static void compile_supply(hxModel *model, const hxDefinition *d) {
   model->supply_resistance = d->servo.supply_resistance;
   if (d->servo.mode == HX_SERVO_KINEMATIC) return;
   model->bus_period = d->servo.bus_period, model->command_step = d->servo.command_step;
+  model->goal_speed = d->servo.goal_speed_max;
+  if (d->servo.drive != HX_DRIVE_MOTOR) return;
+  model->overload_time = d->servo.overload_time;
+  model->overload_left = d->servo.overload_left / d->servo.duty_max;
+  model->overload_torque = d->servo.overload_duty / d->servo.duty_max * model->stall_torque;
 }
 
 static const double lock_yield =
@@ -102,7 +107,10 @@ static void compile_servo(hxModel *model, const hxDefinition *d) {
   model->free_damping = model->kd, model->limit_damping = model->torque_max / model->speed_max;
   model->torque_constant = d->servo.torque_constant, model->resistance = d->servo.resistance;
   model->rotor_inertia = d->servo.rotor_inertia;
+  model->current_torque = 1e300; /* without a limit it changes no bit */
   if (motor) {
+    if (d->servo.current_max > 0.0)
+      model->current_torque = d->servo.torque_constant * d->servo.current_max;
     const double per_volt = d->servo.torque_constant / d->servo.resistance;
     model->stall_torque = per_volt * d->servo.duty_max * d->servo.voltage;
     model->back_emf = d->servo.torque_constant * per_volt;

@@ -127,7 +127,8 @@ static void check_relations(hxChecker *c, const hxDefinition *d) {
   if (d->friction.mu_static != 0.0 && d->friction.mu_static < d->friction.mu)
     hx_check_fail(c, "friction.mu_static", d->friction.mu_static,
                   "at least friction.mu, or 0, which means the same");
-  else if (d->friction.mu_static > d->friction.mu && !hx_friction_kind(d->friction.law).has_friction)
+  else if (d->friction.mu_static > d->friction.mu &&
+           !hx_friction_kind(d->friction.law).has_friction)
     hx_check_fail(c, "friction.mu_static", d->friction.mu_static,
                   "0 or friction.mu with friction.law none, which has no friction");
   if (d->body.self_contact == HX_SELF_FORCE && d->body.knee_radius == 0.0 &&
@@ -161,6 +162,14 @@ hxStatus hx_refuse_elastic_gears(char *message) {
 }
 
 hxStatus hx_definition_check_coordinates(const hxDefinition *d, char *message) {
+  if (d->servo.goal_speed_max > 0.0 || d->servo.overload_time > 0.0) {
+    if (message)
+      hx_print(message, HX_MESSAGE_SIZE,
+               "servo.goal_speed_max, servo.overload_time: got a firmware whose memory is no "
+               "continuous state; expected 0 in model exchange and for derivatives; set them to 0, "
+               "or use co-simulation and differences");
+    return HX_INVALID_ARGUMENT;
+  }
   return hx_has_elastic_gears(d) ? hx_refuse_elastic_gears(message) : HX_OK;
 }
 

@@ -287,6 +287,18 @@ typedef struct hxDefinition {
     double bus_period;
     /* rad  Commanded angles are rounded to multiples of it; 0: they are not */
     double command_step;
+    /* A  Current to which the firmware limits the motor, as far as its duty can; 0: it does not */
+    double current_max;
+    /* rad/s  Speed at which the firmware's setpoint follows commanded angles, co-simulation only;
+     * 0: at once */
+    double goal_speed_max;
+    /* s  Time of a duty above overload_duty after which the overload protection limits it, co-
+     * simulation only; 0: it does not */
+    double overload_time;
+    /* 1  Duty from which on the overload protection counts */
+    double overload_duty;
+    /* 1  Duty limit that the overload protection leaves */
+    double overload_left;
     /* N.m/rad  Stiffness of the gear between rotor and link, co-simulation only; 0: rigid */
     double gear_stiffness;
     /* N.m.s/rad  Damping of the elastic gear */

@@ -1,0 +1,39 @@
+"""Checks what a controller is built from."""
+
+from __future__ import annotations
+
+from hexapod_cosim.controller.gains import Gains
+from hexapod_cosim.controller.walk.gait import Gait
+from hexapod_cosim.models import HexapodError, Robot, unknown_name
+
+LAWS = ("compliant", "paper")  # what the feet's forces do; without gains control is kinematic
+
+
+class ControllerError(HexapodError):
+    """The controller cannot be built, or was called at a wrong time."""
+
+
+def check_period(period: float, gait: Gait) -> None:
+    """Raises ControllerError unless stance and swing of the gait are longer than the period [s]."""
+    shorter = gait.period * min(gait.duty, 1.0 - gait.duty)
+    if not 0.0 < period < shorter:
+        raise ControllerError(
+            "impossible controller period",
+            got=period,
+            expected=f"0 < period < {shorter:g} s, the gait's shorter phase",
+            fix="shorten the period or slow the gait",
+        )
+
+
+def check_law(law: str) -> None:
+    """Raises HexapodError for an unknown name."""
+    if law not in LAWS:
+        raise unknown_name("law", law, LAWS)
+
+
+def gains_warnings(robot: Robot, gains: Gains | None, period: float) -> tuple[str, ...]:
+    """Returns warnings of gains for another robot or period [s], and the caveats of the gains."""
+    if gains is None:
+        return ()
+    mismatch = gains.mismatch(robot, period=period)
+    return (*(() if mismatch is None else (mismatch,)), *gains.caveats)

@@ -1,0 +1,231 @@
+"""What `hexapod identify servo` and `hexapod replay` do with logs of a servo bench."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, fields, replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+
+from hexapod_cosim.controller.figure_style import PALETTE, SETTINGS, WIDTH
+from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
+from hexapod_cosim.cosim.report.page import render
+from hexapod_cosim.extensions.identify.bench.choice import Choice, choose
+from hexapod_cosim.extensions.identify.bench.errors import Errors, log_errors
+from hexapod_cosim.extensions.identify.bench.fit import BENCH, fit_servo
+from hexapod_cosim.extensions.identify.bench.log import BenchLog, read_bench_log
+from hexapod_cosim.extensions.identify.bench.pendulum import Bench, Swing
+from hexapod_cosim.extensions.identify.numbers.servo import TERMS
+from hexapod_cosim.extensions.identify.report import embedded, number
+from hexapod_cosim.models import HexapodError, Robot
+from hexapod_cosim.models.records import Servo
+from hexapod_cosim.models.servos.motor import torque_per_volt
+from hexapod_cosim.models.servos.presets import list_servos, measured_servo
+
+STARTS = {"xl330": "xl330_m4", "sts3215": "sts3215_12v", "sts3250": "sts3250"}  # by the logs' motor
+SERVO, RESULT, REPORT = "servo.toml", "identify.json", "report.html"
+NUMBERS = ("number", "unit", "start", "found", "95 % interval")
+ERRORS = ("angle [deg]", "speed [rad/s]", "duty", "torque")
+# of a servo's table besides what a fit finds
+GIVEN = ("voltage", "duty_max", "torque_continuous", "friction_speed")
+FOUND = (
+    "torque_constant", "resistance", "rotor_inertia", "coulomb_friction", "viscous_friction",
+    "stribeck_friction", "motor_load_friction", "external_load_friction",
+    "stribeck_motor_load_friction", "stribeck_external_load_friction",
+    "quadratic_motor_friction", "quadratic_external_friction", "stribeck_speed",
+    "stribeck_exponent", "current_max", "goal_speed_max", "overload_time", "overload_duty",
+    "overload_left",
+)  # fmt: skip
+
+
+def with_start(robot: Robot, logs: Sequence[BenchLog]) -> Robot:
+    """Returns the robot with the servo that its logs are compared with: its own measured one, or
+    the one of `hexapod list servos` for the logs' motor. Raises HexapodError where there is none.
+    """
+    motor = logs[0].motor
+    if robot.servo.drive == "motor":
+        return robot
+    if motor not in STARTS:
+        raise HexapodError(
+            "no servo to begin with",
+            got=f"logs of {motor!r} and a robot without a measured servo",
+            expected=f"one of {', '.join(list_servos())}",
+            fix='name a robot file with [servo] model = "..." as --robot',
+            where=logs[0].where,
+        )
+    return replace(robot, servo=measured_servo(STARTS[motor]).servo)
+
+
+def identified_servo(
+    paths: Sequence[Path],
+    robot: Robot,
+    *,
+    friction: str | None,
+    by: str,
+    workers: int,
+    progress: Callable[[str], None],
+) -> Choice:
+    """Reads bench logs and fits their servo. Raises HexapodError."""
+    logs = [read_bench_log(path) for path in paths]
+    models = [friction] if friction else list(TERMS)
+    robot = with_start(robot, logs)
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        return choose(logs, robot, pool, by=by, models=models, progress=progress)
+
+
+def result_table(found: Choice) -> dict[str, Any]:
+    """Returns everything that was found, for JSON."""
+    fit = found.fit
+    return {
+        "model": found.model,
+        "models": {key: asdict(one) for key, one in found.models.items()},
+        "held_out": asdict(Errors.mean([one for _, one in found.held_out])),
+        "logs": {log.where: asdict(one) for log, one in found.held_out},
+        "numbers": {
+            key: {"value": value, "start": fit.before[key], "interval": fit.interval(key)}
+            for key, value in fit.values.items()
+        },
+    }
+
+
+def number_rows(found: Choice) -> list[list[str]]:
+    """Returns the rows of a table with NUMBERS."""
+    fit = found.fit
+    return [
+        [row.key, row.unit, number(fit.before[row.key]), number(fit.values[row.key]),
+         " to ".join(map(number, fit.interval(row.key)))]
+        for row in fit.rows
+    ]  # fmt: skip
+
+
+def error_rows(found: Choice) -> list[list[str]]:
+    """Returns the rows of a table of models, or of the one that was fitted, with ERRORS."""
+    table = found.models or {found.model: Errors.mean([one for _, one in found.held_out])}
+    return [[key, *error_texts(one)] for key, one in table.items()]
+
+
+def error_texts(one: Errors) -> list[str]:
+    """Returns the texts of ERRORS."""
+    return [number(getattr(one, item.name)) for item in fields(Errors)]
+
+
+def worth(found: Choice, by: str) -> str:
+    """Returns which model is worth it and what it errs by, as a sentence."""
+    error = Errors.mean([one for _, one in found.held_out])
+    compared = "the simplest model within 5 % of the best, and " if found.models else ""
+    return (
+        f"{found.model} is {compared}fitted to {len(found.held_out)} logs: held out by {by} in "
+        f"turn it errs by {error.angle:.2f} degrees, {error.speed:.2f} rad/s and "
+        f"{error.torque:.2f} of the torque."
+    )
+
+
+def write_servo(found: Choice, folder: Path, *, command: str, by: str) -> list[Path]:
+    """Writes servo.toml, identify.json and run.json; returns the files."""
+    write_text(folder / SERVO, tomlkit.dumps({"servo": servo_table(found, by)}))
+    write_json(folder / RESULT, result_table(found))
+    logs = [log.where for log, _ in found.held_out]
+    write_json(folder / RUN_FILE, {
+        "kind": "identify", "status": "completed", "logs": logs, "command": command,
+    })  # fmt: skip
+    return [folder / name for name in (SERVO, RESULT, RUN_FILE)]
+
+
+def servo_table(found: Choice, by: str) -> dict[str, Any]:
+    """Returns the [servo] section of a robot file with the servo that was found."""
+    servo, logs = found.fit.robot.servo, [log for log, _ in found.held_out]
+    largest = max(logs, key=lambda log: log.gain)
+    error = Errors.mean([one for _, one in found.held_out])
+    changed = [key for key in FOUND if getattr(servo, key) != getattr(Servo, key, None)]
+    table = tomlkit.table()
+    table.comment(
+        f"{logs[0].motor}, {found.model}, {datetime.date.today().isoformat()}: fitted to "
+        f"{len(logs)} bench logs; held out by {by} it errs by {error.angle:.2f} degrees, "
+        f"{error.speed:.2f} rad/s; duty_gain is that of a firmware gain of {largest.register:g}"
+    )
+    table["drive"] = "motor"
+    for key in (*GIVEN, *changed):
+        table[key] = getattr(servo, key)
+    table["duty_gain"] = largest.gain
+    return table
+
+
+@dataclass(frozen=True)
+class BenchReplay:
+    """A bench log and the simulation of it."""
+
+    bench: Bench  # of the log
+    swing: Swing
+    servo: Servo
+    errors: Errors
+
+
+def replayed(path: Path, robot: Robot) -> BenchReplay:
+    """Simulates a bench log with the robot's servo; offset and delay of the bench are fitted."""
+    log = read_bench_log(path)
+    found = fit_servo([log], with_start(robot, [log]), None, seeds=1)
+    bench, servo = Bench([log]), found.robot.servo
+    swing = found.swing(bench)
+    return BenchReplay(bench, swing, servo, log_errors(bench, swing, servo)[0])
+
+
+def write_replay(done: BenchReplay, folder: Path, *, command: str) -> list[Path]:
+    """Writes the page and run.json of a replayed bench log; returns the files."""
+    log = done.bench.logs[0]
+    page = render(
+        "log.html.jinja",
+        extension="identify",
+        title=f"Replay of {Path(log.where).name}",
+        headline=f"{log.motor}, gain {log.register:g}, {log.trajectory}, {log.mass:g} kg at "
+        f"{log.length:g} m",
+        lead="Mean absolute errors; of the torque the error's share of its root mean square. "
+        f"{' and '.join(row.key for row in BENCH)} were fitted to the log.",
+        warnings=[],
+        columns=("log", "", *ERRORS),
+        tables={"Errors": [[log.where, "", *error_texts(done.errors)]]},
+        pictures={"Angle, speed, duty and motor torque": embedded(drawn(done))},
+        command=command,
+        facts={"log": log.where},
+        source=RUN_FILE,
+    )
+    write_text(folder / REPORT, page)
+    facts = {"kind": "replay", "status": "completed", "log": log.where, "command": command}
+    write_json(folder / RUN_FILE, {**facts, "errors": asdict(done.errors)})
+    return [folder / REPORT, folder / RUN_FILE]
+
+
+def drawn(done: BenchReplay) -> Any:
+    """Returns a figure of the first log's readings and of what was simulated."""
+    from matplotlib import rc_context  # noqa: PLC0415  slow to import
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    log, swing, servo = done.bench.logs[0], done.swing, done.servo
+    rows = slice(0, len(log.time))
+    angle, speed, duty = (own[rows, 0, 0] for own in (swing.angle, swing.speed, swing.duty))
+    constant, gain = servo.torque_constant, torque_per_volt(servo)
+    panels = {
+        "angle [rad]": (log.angle, angle),
+        "speed [rad/s]": (log.speed, speed),
+        "duty": (log.duty, duty),
+        "torque [N m]": (
+            gain * (log.duty * log.voltage - constant * log.speed) * log.on,
+            gain * (duty * log.voltage - constant * speed) * log.on,
+        ),
+    }
+    with rc_context(SETTINGS):
+        figure = Figure(figsize=(WIDTH, 4.4), layout="constrained")
+        axes = np.atleast_1d(figure.subplots(len(panels), 1, sharex=True))
+        axes[0].plot(log.time, log.goal, color="0.8", linewidth=0.8, label="goal")
+        for axis, (title, (measured, simulated)) in zip(axes, panels.items(), strict=True):
+            axis.plot(log.time, measured, color="0.45", linewidth=1.2, label="measured")
+            axis.plot(log.time, simulated, color=PALETTE[3], linewidth=0.8, label="simulated")
+            axis.set_ylabel(title, fontsize=6.5)
+        axes[0].legend(fontsize=6.0, ncols=3)
+        axes[-1].set_xlabel("time [s]")
+    return figure

@@ -1,0 +1,200 @@
+"""Fits a servo to bench logs, with the unknowns and the least squares of `hexapod identify`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.extensions.identify.bench.log import BenchLog
+from hexapod_cosim.extensions.identify.bench.pendulum import Bench, Swing, stacked
+from hexapod_cosim.extensions.identify.fitting.covariance import Series, coloured_information
+from hexapod_cosim.extensions.identify.fitting.least_squares import damped_step, huber
+from hexapod_cosim.extensions.identify.numbers import Unknown, section
+from hexapod_cosim.extensions.identify.numbers.servo import SERVO, with_friction_model
+from hexapod_cosim.models import Robot
+
+Array = NDArray[np.float64]
+NOISE = 0.02  # rad  of an angle: residuals beyond three of it count linearly
+STEP = 1e-3  # priors  of the differences
+STEPS = 40  # of the optimiser
+DAMPINGS = (0.0, 1.0, 30.0, 1e3, 3e4)  # of its steps [1/prior^2]
+ENOUGH = 2e-4  # relative change of the sum of squares at which a search ends
+COARSE = 0.003  # s  of the search's steps
+SEEDS = 3  # starts of the search
+SPREAD = 1.0  # priors  of the further starts
+SHORT = 25  # steps from each start, before the best one is finished
+QUANTILE = 1.959963985  # of a normal distribution, for 95 %
+OFFSET, DELAY = "bench.offset", "bench.delay"
+BENCH = (
+    Unknown(key=OFFSET, unit="rad", group="bench", prior=0.03, positive=False),
+    Unknown(key=DELAY, unit="s", group="bench", prior=0.01, positive=False, low=0.0),
+)
+LIMITS = (
+    section("servo.current_max", "A", "servo", 0.3),
+    section("servo.goal_speed_max", "rad/s", "servo", 0.3),
+)
+NOT_FOUND = ("servo.kp", "servo.kd")  # these follow from the gain of each log
+
+
+@dataclass(frozen=True)
+class ServoFit:
+    """A servo fitted to logs."""
+
+    robot: Robot  # with the servo
+    rows: tuple[Unknown, ...]
+    z: Array  # (rows,)  distances from the start's values, in priors
+    before: Mapping[str, float]
+    deviations: Array  # (rows,) of z
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The numbers by key."""
+        return {
+            row.key: row.value(one, self.before[row.key])
+            for row, one in zip(self.rows, self.z.tolist(), strict=True)
+        }
+
+    def interval(self, key: str) -> tuple[float, float]:
+        """Returns the 95 % interval of a number."""
+        k = [row.key for row in self.rows].index(key)
+        return self.rows[k].interval(self.values[key], QUANTILE * float(self.deviations[k]))
+
+    def swing(self, bench: Bench) -> Swing:
+        """Simulates the servo on the benches of logs."""
+        return bench.simulate(self.robot.servo, self.values[OFFSET], self.values[DELAY])
+
+
+class _Problem:
+    """Residuals of angles in deviations, with those from the start's values behind them."""
+
+    def __init__(self, bench: Bench, robot: Robot, rows: Sequence[Unknown]) -> None:
+        self.bench, self.robot, self.rows = bench, robot, tuple(rows)
+        self.before = {row.key: row.read(robot) for row in rows}
+
+    def errors(self, points: Array) -> Array:
+        """Returns simulated - measured angles in deviations (rows, points, logs)."""
+        values = [
+            {
+                row.key: row.value(z, self.before[row.key])
+                for row, z in zip(self.rows, one, strict=True)
+            }
+            for one in points.tolist()
+        ]
+        robots = [self.changed(one) for one in values]
+        offset, delay = (np.array([[one[key]] for one in values]) for key in (OFFSET, DELAY))
+        swing = self.bench.simulate(stacked([one.servo for one in robots]), offset, delay)
+        error = swing.angle - self.bench.measured[:, None]
+        return np.where(self.bench.counted[:, None], error, 0.0) / NOISE
+
+    def values(self, z: Array) -> dict[str, float]:
+        """Returns the numbers by key."""
+        pairs = zip(self.rows, z.tolist(), strict=True)
+        return {row.key: row.value(one, self.before[row.key]) for row, one in pairs}
+
+    def changed(self, values: Mapping[str, float]) -> Robot:
+        """Returns the robot with the servo's numbers."""
+        robot = self.robot
+        for row in self.rows:
+            robot = row.write(robot, values[row.key])
+        return robot
+
+    def residuals(self, z: Array) -> Array:
+        return np.concatenate([self.errors(z[None])[:, 0].ravel(), z])
+
+    def slopes(self, z: Array) -> Array:
+        """Returns the derivatives of the errors (rows, logs, numbers)."""
+        steps = np.where(z + STEP > self.bounds()[1], -STEP, STEP)
+        errors = self.errors(np.vstack([z, z + np.diag(steps)]))
+        found = (errors[:, 1:] - errors[:, :1]) / steps[:, None]
+        return np.moveaxis(found, 1, 2)
+
+    def jacobian(self, z: Array) -> Array:
+        slopes = self.slopes(z)
+        return np.vstack([slopes.reshape(-1, len(z)), np.eye(len(z))])
+
+    def bounds(self) -> tuple[Array, Array]:
+        low, high = zip(*(row.bounds(self.before[row.key]) for row in self.rows), strict=True)
+        return np.array(low), np.array(high)
+
+
+def fit_servo(
+    logs: Sequence[BenchLog],
+    robot: Robot,
+    model: str | None,
+    *,
+    seeds: int = SEEDS,
+) -> ServoFit:
+    """Returns the servo that follows bench logs best.
+
+    Args:
+        logs: their gains are known.
+        robot: whose servo is where the search begins.
+        model: friction model, "m1" to "m6"; None: of the bench alone offset and delay are sought.
+        seeds: number of starts.
+
+    Raises HexapodError for an unknown model and a servo without a motor.
+    """
+    if model is not None:
+        robot = with_friction_model(robot, model)
+    rows = BENCH if model is None else unknowns(robot)
+    problem = _Problem(Bench(logs, step=COARSE), robot, rows)
+    rng = np.random.default_rng(1)
+    found = []
+    for seed in range(seeds):
+        start = SPREAD * rng.standard_normal(len(rows)) if seed else np.zeros(len(rows))
+        z = _searched(problem, np.clip(start, *problem.bounds()), SHORT)
+        found.append((huber(problem.residuals(z)), seed, z))
+    problem = _Problem(Bench(logs), robot, rows)
+    z = _searched(problem, min(found)[2], STEPS)
+    return ServoFit(
+        robot=problem.changed(problem.values(z)),
+        rows=tuple(rows),
+        z=z,
+        before=problem.before,
+        deviations=np.sqrt(np.diag(_covariance(problem, z))),
+    )
+
+
+def _covariance(problem: _Problem, z: Array) -> Array:
+    """Returns the covariance of the numbers (rows, rows), with the spectra of each log's errors."""
+    errors, slopes = problem.errors(z[None])[:, 0], problem.slopes(z)
+    series = [
+        Series(errors[:, k : k + 1], slopes[:, k : k + 1], float(np.mean(own)))
+        for k, own in enumerate(problem.bench.counted.T)
+    ]
+    return np.asarray(np.linalg.inv(coloured_information(series) + np.eye(len(z))))
+
+
+def _searched(problem: _Problem, z: Array, steps: int) -> Array:
+    """Returns the numbers of the least sum of squares near a start.
+
+    The steps are Levenberg and Marquardt's; several dampings are simulated at once.
+    """
+    bounds = problem.bounds()
+    residuals = problem.residuals(z)
+    for _ in range(steps):
+        cost, jacobian = huber(residuals), problem.jacobian(z)
+        points = np.array([
+            np.clip(z + damped_step(jacobian, residuals, z, bounds, damping), *bounds)
+            for damping in DAMPINGS
+        ])  # fmt: skip
+        errors = problem.errors(points)
+        found = [np.concatenate([errors[:, k].ravel(), own]) for k, own in enumerate(points)]
+        costs = [huber(one) for one in found]
+        best = int(np.argmin(costs))
+        if not costs[best] < cost:
+            break
+        z, residuals = points[best], found[best]
+        if costs[best] > (1.0 - ENOUGH) * cost:
+            break
+    return z
+
+
+def unknowns(robot: Robot) -> Sequence[Unknown]:
+    """Returns the rows of the servo's numbers and of the bench's."""
+    limits = [row for row in LIMITS if row.read(robot) > 0.0]
+    rows = [row for row in SERVO if row.applies(robot) and row.key not in NOT_FOUND]
+    return [*(row.of_robot(robot) for row in (*rows, *limits)), *BENCH]

@@ -1,0 +1,112 @@
+"""Tests derivatives by tunable parameters against differences, and adjoint ones against columns."""
+
+from __future__ import annotations
+
+import ctypes
+from pathlib import Path
+
+import numpy as np
+import pytest
+from exchange_calls import (
+    INPUTS,
+    STATES,
+    UNKNOWNS,
+    Array,
+    directional,
+    fetched,
+    put_states,
+)
+from fmi3_plant import ARRAYS, Plant3
+from fmi_plant import ATHENA, MODEL_EXCHANGE, OK, Plant
+
+PARAMETERS = (
+    "torso.mass", "torso.com[1]", "torso.inertia_xx", "LF.tibia.mass", "RM.femur.com[1]",
+    "LR.coxa.inertia_zz", "contact.stiffness", "contact.restitution", "friction.mu",
+    "friction.slope", "servo.kp", "servo.kd", "servo.rotor_inertia", "servo.coulomb_friction",
+    "gravity[3]",
+)  # fmt: skip
+BOOKED = ("energy.residual", "energy.parameter_work")  # depend on how a parameter came about
+SHOWN = [name for name in UNKNOWNS if name not in BOOKED]
+DIFFERENCE = 2e-6  # relative to the largest of its kind: of differences of order two
+COLUMNS = 1e-12  # relative: rounding of sums
+
+
+def walking(library: Path) -> Plant:
+    """Returns an instance in event mode that stands with speeds on all joints."""
+    plant = Plant(library, kind=MODEL_EXCHANGE).initialize()
+    assert plant.call("fmi2NewDiscreteStates", ctypes.create_string_buffer(64)) == OK
+    assert plant.call("fmi2EnterContinuousTimeMode") == OK
+    rng, x = np.random.default_rng(4), fetched(plant, "fmi2GetContinuousStates", len(STATES))
+    moving = np.array([name.endswith(".speed") or "velocity" in name for name in STATES])
+    assert put_states(plant, x + moving * rng.normal(0.0, 0.05, len(x))) == OK
+    assert plant.call("fmi2EnterEventMode") == OK
+    return plant
+
+
+def shown_at(plant: Plant, name: str, value: float, x: Array) -> Array:
+    """Returns the unknowns at a parameter and states."""
+    assert plant.set_reals({name: value}) == OK
+    assert plant.call("fmi2NewDiscreteStates", ctypes.create_string_buffer(64)) == OK
+    assert plant.call("fmi2EnterContinuousTimeMode") == OK
+    assert put_states(plant, x) == OK
+    shown = np.array(plant.reals(SHOWN))
+    assert plant.call("fmi2EnterEventMode") == OK
+    return shown
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_derivatives_by_parameters_are_the_limits_of_differences(
+    plant_library: Path, name: str
+) -> None:
+    plant = walking(plant_library)
+    x, value = fetched(plant, "fmi2GetContinuousStates", len(STATES)), plant.real(name)
+    status, exact = directional(plant, SHOWN, [name], [1.0])
+    assert status == OK, plant.last_message
+    h = 1e-4 * (abs(value) or 1.0)
+    ends = [shown_at(plant, name, value + sign * h, x) for sign in (1.0, -1.0)]
+    found = (ends[0] - ends[1]) / (2.0 * h)
+    size = np.abs(ends[0]) / (abs(value) or 1.0) * 1e-6 + np.abs(found).max() * DIFFERENCE
+    assert np.all(np.abs(exact - found) <= size)
+    assert np.abs(exact).max() > 0.0
+
+
+def test_adjoint_derivatives_are_the_seeded_sums_of_columns(
+    running3: Plant3, running: Plant
+) -> None:
+    running3.step(0.0, 0.01)
+    running.step(0.0, 0.01)
+    rng = np.random.default_rng(1)
+    wanted = [ARRAYS[name] for name in ("der(speed)", "foot.force", "torso.velocity")]
+    given = [ARRAYS[name] for name in ("torque_ref", "angle", "servo.kp", "torso.com")]
+    rows, columns = (sum(len(one.elements) for one in group) for group in (wanted, given))
+    seed = rng.normal(0.0, 1.0, rows)
+    result = (ctypes.c_double * columns)()
+    references = [(ctypes.c_uint * len(g))(*(a.reference for a in g)) for g in (wanted, given)]
+    assert running3.call(
+        "fmi3GetAdjointDerivative", references[0], len(wanted), references[1], len(given),
+        (ctypes.c_double * rows)(*seed), rows, result, columns,
+    ) == OK, running3.last_message  # fmt: skip
+    names = [element.name for array in wanted for element in array.elements]
+    expected = [
+        seed @ directional(running, names, [element.name], [1.0])[1]
+        for array in given
+        for element in array.elements
+    ]
+    np.testing.assert_allclose(list(result), expected, rtol=COLUMNS, atol=1e-9)
+
+
+def test_a_direction_of_states_inputs_and_parameters_is_the_sum_of_each(running: Plant) -> None:
+    running.step(0.0, 0.01)
+    knowns = [STATES[3], INPUTS[4], "servo.kp", "torso.mass"]
+    change = [0.3, -2.0, 5.0, 0.7]
+    together = directional(running, SHOWN, knowns, change)[1]
+    single = sum(
+        c * directional(running, SHOWN, [k], [1.0])[1] for k, c in zip(knowns, change, strict=True)
+    )
+    np.testing.assert_allclose(together, single, atol=1e-10 * np.abs(together).max())
+
+
+def test_a_fixed_parameter_has_no_derivative(running: Plant) -> None:
+    assert directional(running, ["torso.roll"], ["foot.radius"], [1.0])[0] != OK
+    assert "tunable parameter" in running.last_message
+    assert ATHENA.variable("foot.radius").variability == "fixed"
