@@ -156,7 +156,7 @@ def test_a_leg_that_does_not_move_is_folded_and_comes_back_without_a_jump(law: s
     measurement = Measurement(angle=ROBOT.stance.copy())
     absent, angles = [], []
     for k in range(2000):
-        out = controller.step(k * H, BodyCommand(vx=0.08), measurement)
+        out = controller.step(k * H, BodyCommand(vx=0.04), measurement)
         resting = measurement.angle[LM].copy()
         support = ~controller.diagnostics.swinging & ~controller.diagnostics.absent
         measurement.foot_force[:, 2] = np.where(support, ROBOT.weight / support.sum(), 0.0)
