@@ -24,8 +24,6 @@ from hexapod_cosim.cosim.common.plant_files import (
     source_files,
 )
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.export.documentation import render_html
-from hexapod_cosim.cosim.export.picture import draw_robot
 from hexapod_cosim.cosim.export.platforms import (
     build_binaries,
     choose_platforms,
@@ -264,6 +262,9 @@ def extra_members(
         fmi: version of the standard.
         reference: whether the archive contains reference results.
     """
+    # imported here: runs need neither pages nor pictures
+    from hexapod_cosim.cosim.export.documentation import render_html  # noqa: PLC0415
+
     ports = list(interface.by_name)
     if fmi == 3:
         seen = ("input", "output")
@@ -280,6 +281,8 @@ def extra_members(
 
 def pictures(interface: Interface, *, fmi: int = 2) -> dict[str, bytes]:
     """Returns the robot's picture and icon by path in the archive."""
+    from hexapod_cosim.cosim.export.picture import draw_robot  # noqa: PLC0415
+
     sizes = {PICTURES[fmi]: PICTURE_SIZE, f"{FOLDER}/{ICON}": ICON_SIZE}
     return {
         path: draw_robot(interface.robot, width=width, height=height)

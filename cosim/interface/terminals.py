@@ -23,7 +23,7 @@ Group = tuple[str, str, tuple[str, ...]]  # name, meaning, members
 LEGS: tuple[Group, ...] = (
     ("command", "joint commands", COMMANDS),
     ("state", "joint states", STATES),
-    ("servo", "faults of the servos", ("strength", "lock")),
+    ("servo", "faults of the servos", ("weakness", "lock")),
 )
 FOOT = "contact of the foot with the ground"
 TORSO: tuple[Group, ...] = (

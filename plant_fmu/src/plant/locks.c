@@ -1,4 +1,5 @@
 #include <math.h>
+#include <string.h>
 
 #include "parts.h"
 
@@ -27,7 +28,9 @@ void hx_plant_derive_stops(hxPlant *plant) {
 
 /* Returns whether an input asks for other locks than there are. */
 static int locks_change(const hxPlant *plant, const hxInput *input) {
+  static const double none[HX_LEGS][HX_JOINTS];
   int changed = 0;
+  if (!(plant->model.stops & 2) && memcmp(input->lock, none, sizeof none) == 0) return 0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       changed |= (input->lock[leg][joint] >= 0.5) != (plant->state.locked[joint][leg] != 0.0);
