@@ -171,7 +171,7 @@ class Servo:
     # how commands reach the servos, but in kinematic mode: transmissions, rounding of angles
     bus_period: Annotated[float, Number("s", at_least=0.0, at_most=1e3)] = 0.0
     command_step: Annotated[float, Number("rad", at_least=0.0, at_most=1.0)] = 0.0
-    # what a firmware limits besides the duty (eq. 48, 58, 59); 0: it does not
+    # what a firmware limits besides the duty (eq. 48, 60, 61); 0: it does not
     current_max: Annotated[float, Number("A", at_least=0.0, at_most=1e6)] = 0.0
     goal_speed_max: Annotated[float, Number("rad/s", at_least=0.0, at_most=1e3)] = 0.0
     # a duty above overload_duty for overload_time leaves overload_left

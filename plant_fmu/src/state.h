@@ -160,7 +160,7 @@ typedef struct hxModel {
   double bus_period, command_step; /* s, rad  0 in kinematic mode */
   double current_torque;           /* N m    k_t times the largest current; huge: no limit */
   double goal_speed;               /* rad/s  of the firmware's setpoints; 0: no limit */
-  double overload_time, overload_torque, overload_left; /* s, N m, 1  eq. 59 */
+  double overload_time, overload_torque, overload_left; /* s, N m, 1  eq. 61 */
   double ground_point[3], ground_normal[3];
   double soil[HX_SOIL_SHAPES][HX_SOIL_SIZE]; /* hxSoil of each shape, of the definition */
   double bristle_length;                     /* m  presliding, or shear displacement of the soil */
@@ -194,10 +194,10 @@ typedef struct hxBus {
 
 /* What the servos' firmware remembers, legs innermost. */
 typedef struct hxFirmware {
-  double angle[HX_JOINTS][HX_SLOTS];  /* rad    setpoints at the last command (eq. 58), */
+  double angle[HX_JOINTS][HX_SLOTS];  /* rad    setpoints at the last command (eq. 60), */
   double rate[HX_JOINTS][HX_SLOTS];   /* rad/s  their speed since, */
   double time;                        /* s      and its time */
-  double loaded[HX_JOINTS][HX_SLOTS]; /* s  of a duty above the overload limit (eq. 59), with the
+  double loaded[HX_JOINTS][HX_SLOTS]; /* s  of a duty above the overload limit (eq. 61), with the
                                        *    sign of the duty */
 } hxFirmware;
 

@@ -99,14 +99,14 @@ class Bench:
             supply = self.voltage[row] / servo.voltage
             found.angle[row], found.speed[row] = state.angle - offset, state.speed
             for part in range(parts if later > row else 0):
-                goal = self._goal(self.time[row] + (part + 0.5) * h - delay) + offset
+                goal = self.goal(self.time[row] + (part + 0.5) * h - delay) + offset
                 duty = state.step(servo, self, h, goal, supply, self.on[row])
                 if part == 0:
                     found.duty[row] = duty
         found.duty[-1] = found.duty[-2]
         return found
 
-    def _goal(self, time: Array) -> Array:
+    def goal(self, time: Array) -> Array:
         """Returns the goals at times (servos, logs) between rows, or (logs,)."""
         table = np.atleast_2d(time)
         found = np.empty(table.shape)
