@@ -128,7 +128,6 @@ typedef struct hxEnvDraws {
   const fmi2ValueReference *reference; /*       [count] */
   const double *low, *high;            /*       [count] range, both ends possible */
   const int32_t *whole;                /* 1     [count] whole numbers only */
-  const int32_t *group;                /* 1     [count] number of the random number */
   size_t count;
 } hxEnvDraws;
 
@@ -194,7 +193,7 @@ typedef struct hxEnvironments hxEnvironments;
 
 /* Number of the layout of hxEnvSettings, hxEnvArrays, the structures in them and the lists of names
  * above. A change of their members, or of what a member means, increases it. */
-#define HX_ENVIRONMENTS_LAYOUT 3
+#define HX_ENVIRONMENTS_LAYOUT 4
 
 /* Layout and size of hxEnvSettings in this library, with which callers check their own. */
 HX_API int hx_environments_layout(void);
