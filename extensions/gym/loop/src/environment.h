@@ -31,10 +31,10 @@ typedef struct hxEnvironment {
   int ended;                                   /* 1: the episode is over, or none was started */
   int reason;                                  /* hxEnvReason */
   double value[HX_ENV_VALUES + HX_ENV_INPUTS]; /* outputs of the plant, then its inputs */
-  double action[HX_ENV_JOINTS];    /* 1    last one, limited */
-  double command[3];               /* m/s, m/s, rad/s  forward, to the left, yaw rate */
-  double *drawn;                   /*      [draws.count] values of the parameters */
-  fmi2CallbackFunctions callbacks; /* of the plant */
+  double action[HX_ENV_JOINTS];                /* 1    last one, limited */
+  double command[3];                           /* m/s, m/s, rad/s  forward, to the left, yaw rate */
+  double *drawn;                               /*      [draws.count] values of the parameters */
+  fmi2CallbackFunctions callbacks;             /* of the plant */
   char message[HX_MESSAGE_SIZE];
 } hxEnvironment;
 

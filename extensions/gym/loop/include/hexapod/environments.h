@@ -139,11 +139,11 @@ typedef struct hxEnvSettings {
                                        *      otherwise the first */
   double clock;                       /* Hz */
   double command_low[3], command_high[3]; /* m/s, m/s, rad/s  ranges of the drawn commands */
-  size_t push_interval;    /* 1    steps from the start of a push to the next; 0: none */
-  size_t push_length;      /* 1    steps that a push lasts */
-  double push_force;       /* N    largest; horizontal, of uniform size and direction */
-  double upright;          /* 1    least cosine of the torso's lean */
-  double belly_force;      /* N    largest force of the ground on the torso */
+  size_t push_interval;        /* 1    steps from the start of a push to the next; 0: none */
+  size_t push_length;          /* 1    steps that a push lasts */
+  double push_force;           /* N    largest; horizontal, of uniform size and direction */
+  double upright;              /* 1    least cosine of the torso's lean */
+  double belly_force;          /* N    largest force of the ground on the torso */
   double weight[HX_ENV_TERMS]; /*      of the terms of the reward */
   double width[2];             /* m/s, rad/s  of the tracking terms: exp(-(e / width)^2) */
   int autoreset;               /* hxAutoreset */
