@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +14,10 @@ from hexapod_cosim.models import RobotError
 from hexapod_cosim.models.errors import refuse_path
 from hexapod_cosim.models.files import read_text
 from hexapod_cosim.models.schema import (
-    Text,
     decoding_toml,
-    expect_table,
     parse_toml,
     read_given,
+    read_record,
     require,
     specs,
 )
@@ -48,7 +46,7 @@ def save_gains(gains: Gains, path: str | Path) -> Path:
     Raises GainsError when the file cannot be written.
     """
     lines = ["# Gains of compliant and paper control, SI units; made by `hexapod design`."]
-    lines += [f"format = {FORMAT}", *_toml_lines(gains), f"caveats = {json.dumps(gains.caveats)}"]
+    lines += [f"format = {FORMAT}", *_toml_lines(gains)]
     for part in SECTIONS:
         lines += ["", f"[{part}]", *_toml_lines(getattr(gains, part))]
     target = Path(path)
@@ -67,10 +65,10 @@ def save_gains(gains: Gains, path: str | Path) -> Path:
 
 
 def _toml_lines(record: Any) -> list[str]:
-    """Returns a line for each number and text of a record; a margin without a limit has none."""
+    """Returns a line for each plain field of a record; a margin without a limit has none."""
     values = {key: getattr(record, key) for key in specs(type(record))}
     return [
-        f"{key} = {json.dumps(value) if isinstance(value, str) else repr(value)}"
+        f"{key} = {json.dumps(value) if isinstance(value, str | tuple) else repr(value)}"
         for key, value in values.items()
         if value != math.inf
     ]
@@ -106,20 +104,7 @@ def load_gains(path: str | Path) -> Gains:
 def _read(table: dict[str, Any], where: str) -> Gains:
     """Returns the gains of a file's tables. Raises RobotError; `where` names the file."""
     parts = {
-        name: _read_record(kind, table.pop(name, None), f"{where}: [{name}]")
+        name: read_record(kind, table.pop(name, None), f"{where}: [{name}]")
         for name, kind in SECTIONS.items()
     }
-    caveats = table.pop("caveats", [])
-    texts = caveats if isinstance(caveats, list) else [caveats]
-    known = tuple(Text().read(text, f"{where}: caveats") for text in texts)
-    head = require(Gains, read_given(Gains, table, where), where)
-    return Gains(**head, **parts, caveats=known)
-
-
-def _read_record(kind: type[Any], value: Any, where: str) -> Any:
-    """Returns a record of a table; a margin without a limit may be absent, or infinite."""
-    table = expect_table(value, where)
-    given = {key: value for key, value in table.items() if value != math.inf}
-    values = read_given(kind, given, where)
-    usual = {item.name: item.default for item in fields(kind) if item.default is not MISSING}
-    return kind(**require(kind, usual | values, where))
+    return Gains(**require(Gains, read_given(Gains, table, where), where), **parts)
