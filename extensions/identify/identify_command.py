@@ -148,6 +148,14 @@ def _identify_servo(
 
     if by not in GROUPINGS:
         raise unknown_name("grouping of logs", by, GROUPINGS, where="--hold-out")
+    if not logs:
+        raise HexapodError(
+            "no bench logs",
+            got=f"the word {SERVO_WORD!r} alone",
+            expected="JSON files of BAM or K-Scale behind it",
+            fix="hexapod identify servo logs/*.json",
+            where="LOG",
+        )
     words = ["hexapod", "identify", SERVO_WORD, *map(str, logs), "--robot", robot]
     words += ["--hold-out", by, *(["--friction", friction] if friction else [])]
     with results_folder(output or Path("out") / "identify") as folder:

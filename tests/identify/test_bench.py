@@ -192,3 +192,15 @@ def test_a_file_that_is_no_bench_log_is_refused(call: Call, tmp_path: Path) -> N
     outcome = call("identify", "servo", tmp_path / "x.json", "-o", tmp_path / "out")
     assert_refused(outcome, "no log of a servo bench", "'entries'", "BAM or K-Scale")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_replayed_bench_log_is_drawn_beside_its_simulation(call: Call, tmp_path: Path) -> None:
+    entries = [
+        {**ENTRY, "timestamp": 0.02 * k, "goal_position": 0.01 * k, "position": 0.01 * k, "load": 0}
+        for k in range(40)
+    ]
+    table = {"mass": 0.5, "length": 0.1, "kp": 200, "trajectory": "ramp", "motor": "xl330"}
+    (tmp_path / "x.json").write_text(json.dumps({**table, "entries": entries}), encoding="utf-8")
+    call("replay", tmp_path / "x.json", "-o", tmp_path / "out")
+    assert "data:image/svg+xml" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert_refused(call("identify", "servo", "-o", tmp_path / "none"), "no bench logs", "JSON")
