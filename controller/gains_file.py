@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +16,9 @@ from hexapod_cosim.models.files import read_text
 from hexapod_cosim.models.schema import (
     Text,
     decoding_toml,
-    expect_table,
     parse_toml,
     read_given,
+    read_record,
     require,
     specs,
 )
@@ -106,7 +105,7 @@ def load_gains(path: str | Path) -> Gains:
 def _read(table: dict[str, Any], where: str) -> Gains:
     """Returns the gains of a file's tables. Raises RobotError; `where` names the file."""
     parts = {
-        name: _read_record(kind, table.pop(name, None), f"{where}: [{name}]")
+        name: read_record(kind, table.pop(name, None), f"{where}: [{name}]")
         for name, kind in SECTIONS.items()
     }
     caveats = table.pop("caveats", [])
@@ -114,12 +113,3 @@ def _read(table: dict[str, Any], where: str) -> Gains:
     known = tuple(Text().read(text, f"{where}: caveats") for text in texts)
     head = require(Gains, read_given(Gains, table, where), where)
     return Gains(**head, **parts, caveats=known)
-
-
-def _read_record(kind: type[Any], value: Any, where: str) -> Any:
-    """Returns a record of a table; a margin without a limit may be absent, or infinite."""
-    table = expect_table(value, where)
-    given = {key: value for key, value in table.items() if value != math.inf}
-    values = read_given(kind, given, where)
-    usual = {item.name: item.default for item in fields(kind) if item.default is not MISSING}
-    return kind(**require(kind, usual | values, where))

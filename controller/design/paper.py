@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 import control
 import numpy as np
 
-from hexapod_cosim.controller.design.closed import parallel, spectral_radius
 from hexapod_cosim.controller.design.loci import (
     SLOWEST,
     LoopMargins,
@@ -37,6 +36,7 @@ from hexapod_cosim.models import Robot
 Plants = Mapping[str, StandingPlant]
 JUDGED = 200  # frequencies
 ROUNDING = 1e-9  # 1    of a period
+FREE_COORDINATES = 3  # x, y and yaw of the robot, which nothing controls
 BACK_OFF, BACK_OFFS = 0.95, 60  # 1    reduction of the shares at a missed margin, and attempts
 
 
@@ -102,6 +102,14 @@ def late_filter(gains: PaperGains, *, period: float, delays: int) -> control.Sta
     return smooth * late
 
 
+def parallel(system: control.StateSpace, count: int) -> control.StateSpace:
+    """Returns `count` copies of a system of one input and one output in parallel."""
+    return control.ss(
+        *(np.kron(np.eye(count), matrix) for matrix in (system.A, system.B, system.C, system.D)),
+        system.dt,
+    )
+
+
 def closed_loop(
     robot: Robot, plant: StandingPlant, gains: PaperGains, *, delays: int
 ) -> control.StateSpace:
@@ -110,6 +118,16 @@ def closed_loop(
     smooth = parallel(late_filter(gains, period=period, delays=delays), len(matrix))
     law = control.ss(smooth.A, smooth.B, matrix @ smooth.C, matrix @ smooth.D, period)
     return control.feedback(shifted(robot, plant), law, sign=1)
+
+
+def spectral_radius(system: control.StateSpace) -> float:
+    """Returns the largest magnitude of a closed loop's eigenvalues that are not 1 by construction.
+
+    The position of the robot on the ground is not controlled: its eigenvalues are exactly 1.
+    """
+    values = np.linalg.eigvals(system.A)
+    by_distance = np.abs(values)[np.argsort(np.abs(values - 1.0))]
+    return float(by_distance[FREE_COORDINATES:].max())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,6 @@
-"""Draws the loops of the paper's control: a Bode diagram, responses to shifts, and margins.
+"""Draws the loops of the paper's control: Bode diagram, responses to shifts, and margin over delay.
 
-The diagram shows all eigenloci; margins are drawn over delay and over the shares.
+The diagram shows all eigenloci.
 """
 
 from __future__ import annotations
@@ -9,70 +9,53 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import control
 import numpy as np
 
-from hexapod_cosim.controller.design.closed import disturbed, spectral_radius, splay
-from hexapod_cosim.controller.design.loci import Response, critical_size, static_margin
+from hexapod_cosim.controller.design.loci import Response, critical_size
 from hexapod_cosim.controller.design.paper import (
     PaperLoops,
     Plants,
     closed_loop,
-    scaled,
     shifted,
 )
 from hexapod_cosim.controller.design.standing import StandingPlant, weight_share
 from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
-from hexapod_cosim.controller.gains import Gains, GainsError
+from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.plane import Array
+from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
 
 STEP_TIME = 0.6  # s    shown of a response
 SHIFT = 0.001  # m    of the feet
+RISE = 0.05  # s    duration of the ramp of a disturbance
 MOST_DELAY, DELAYS = 0.05, 21  # s    further delay shown, and in how many points
-FACTORS = np.linspace(0.5, 3.5, 16)  # 1    on the shares
 SMALLEST = 0.03  # 1    size of loci that are drawn
 DECIBELS = (-40.0, 10.0)
 COLOURS = {"worst": PALETTE[3], "others": "0.75", "asked": PALETTE[0], "without": PALETTE[1]}
 
 
 def plot_design(robot: Robot, gains: Gains, plants: Plants, directory: str | Path) -> list[Path]:
-    """Writes `bode`, `step` and `margins` as SVG and PNG; returns the paths.
+    """Writes `bode`, `step` and `margins` as SVG and PNG into a folder; returns the paths.
 
-    robot, plants: those that the gains were designed for. Raises GainsError for gains of another
-    robot, or when the figures cannot be written.
+    robot, plants: those that the gains were designed for. Raises OSError.
     """
-    if robot.hash != gains.robot_hash:
-        fix = "pass the robot they were designed for"
-        raise GainsError(
-            "not the robot of these gains",
-            got=robot.hash[:12],
-            expected=gains.robot_hash[:12],
-            fix=fix,
-        )
+    from matplotlib import rc_context  # noqa: PLC0415  slow to import
+
     loops = PaperLoops(robot, plants, gains.requirements, period=gains.period)
     loci = np.concatenate([loops.loci(name, gains.paper) for name in plants])
     loci = loci[np.abs(loci).max(axis=1) > SMALLEST]
-    from matplotlib import rc_context  # noqa: PLC0415  slow to import
-
-    folder = Path(directory)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with rc_context(SETTINGS):
-            figures = {
-                "bode": _bode(loci, loops.omega, gains),
-                "step": _step(loops, gains),
-                "margins": _margins(loci, loops, gains),
-            }
-            return [
-                path for name, figure in figures.items() for path in _save(figure, folder, name)
-            ]
-    except OSError as error:
-        raise GainsError(
-            "cannot write the design's figures",
-            got=error.strerror,
-            fix="choose a writable folder",
-            where=str(folder),
-        ) from error
+    with rc_context(SETTINGS):
+        figures = {
+            "bode": _bode(loci, loops.omega, gains),
+            "step": _step(loops, gains),
+            "margins": _margins(loci, loops, gains),
+        }
+        return [
+            path
+            for name, figure in figures.items()
+            for path in _save(figure, Path(directory), name)
+        ]
 
 
 def _figure(rows: int, columns: int, gains: Gains, **options: Any) -> tuple[Any, Any]:
@@ -146,11 +129,33 @@ def _nominal(robot: Robot, plants: Plants) -> StandingPlant:
     return min(plants.values(), key=lambda p: (-p.standing.sum(), abs(p.load(robot).mean() - 1.0)))
 
 
+def _splay(robot: Robot, plant: StandingPlant) -> Array:
+    """Returns shifts (3 n) of unit length that spread the standing feet, without a common one."""
+    feet = LegSolver(robot).forward(plant.angle)[plant.standing]
+    outwards = feet[:, :2] / np.linalg.norm(feet[:, :2], axis=1)[:, None]
+    shifts = np.zeros_like(feet)
+    shifts[:, :2] = outwards - outwards.mean(axis=0)
+    return np.asarray(shifts.reshape(-1) / np.linalg.norm(shifts))
+
+
+def disturbed(
+    system: control.StateSpace, disturbance: Array, *, duration: float
+) -> tuple[Array, Array]:
+    """Returns times (steps,) [s] and outputs (outputs, steps) of a discrete system's response.
+
+    disturbance: final values (inputs,) of ramps at the inputs; a jump would give the servos an
+    impulse of commanded speed.
+    """
+    time = np.arange(round(duration / system.dt)) * system.dt
+    ramps = np.outer(disturbance, np.clip((time + time[1]) / RISE, 0.0, 1.0))
+    return time, np.asarray(control.forced_response(system, time, ramps, squeeze=False).outputs)
+
+
 def _step(loops: PaperLoops, gains: Gains) -> Any:
     """Draws the forces on feet that are spread, and on a foot on a bump, with and without law."""
     figure, (row,) = _figure(1, 2, gains)
     robot, plant = loops.robot, _nominal(loops.robot, loops.plants)
-    spread, share = splay(robot, plant), weight_share(robot)
+    spread, share = _splay(robot, plant), weight_share(robot)
     bump = np.zeros(len(spread))
     bump[2] = -1.0
     for system, label, colour, dashes in (
@@ -177,44 +182,14 @@ def _step(loops: PaperLoops, gains: Gains) -> Any:
 
 
 def _margins(loci: Response, loops: PaperLoops, gains: Gains) -> Any:
-    """Draws the least gain margin over further delay, and the poles over the shares."""
-    figure, ((late, more),) = _figure(1, 2, gains)
-    colour, needs = COLOURS["worst"], gains.requirements
+    """Draws the least gain margin over further delay."""
+    figure, ((late,),) = _figure(1, 1, gains)
     delays = np.linspace(0.0, MOST_DELAY, DELAYS)
     sizes = [critical_size(loci * np.exp(-1j * loops.omega * delay)).max() for delay in delays]
-    late.plot(1e3 * delays, -20.0 * np.log10(sizes), color=colour, marker="o", ms=3, lw=1.0)
-    late.axhline(
-        needs.gain_margin, color=COLOURS["asked"], ls="--", lw=1.0, label="asked without it"
-    )
+    late.plot(1e3 * delays, -20.0 * np.log10(sizes), color=COLOURS["worst"], marker="o", ms=3)
+    asked, colour = gains.requirements.gain_margin, COLOURS["asked"]
+    late.axhline(asked, color=colour, ls="--", lw=1.0, label="asked without it")
     late.axhline(0.0, color="k", lw=0.6)
     late.set(xlabel="further delay [ms]", ylabel="gain margin [dB]")
-    counts = sorted({int(plant.standing.sum()) for plant in loops.plants.values()})
-    for count, colour in zip(counts, PALETTE[3:], strict=False):
-        edge, name = max(
-            (_edge(loops.loci(name, gains.paper)), name)
-            for name, plant in loops.plants.items()
-            if plant.standing.sum() == count
-        )
-        closed = [
-            closed_loop(
-                loops.robot, loops.plants[name], scaled(gains.paper, factor), delays=loops.delays
-            )
-            for factor in FACTORS
-        ]
-        radii = [spectral_radius(loop) for loop in closed]
-        more.plot(FACTORS, radii, color=colour, marker="o", ms=3, lw=1.0, label=name)
-        more.axvline(1.0 / edge, color=colour, ls="--", lw=1.0)
-    more.axhline(1.0, color="k", lw=0.6)
-    more.set(
-        xlabel="factor on the shares [1]",
-        ylabel="spectral radius [1]",
-        title="dashed: by the margins",
-        xlim=FACTORS[[0, -1]],
-    )
-    _legend_below(figure, late, more)
+    _legend_below(figure, late)
     return figure
-
-
-def _edge(loci: Response) -> float:
-    """Returns the inverse of the factor on the shares at which a plant becomes unstable."""
-    return max(float(critical_size(loci).max()), float(10.0 ** (-static_margin(loci) / 20.0)))

@@ -40,23 +40,20 @@ class Inertial:
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
-    """A collision shape in its link's frame [m]."""
+class Sphere:
+    """A collision sphere in its link's frame [m]."""
 
-    kind: str  # box, cylinder, sphere, capsule
     centre: Array  # (3,)
-    rotation: Array  # (3, 3) shape to link
-    half: Array  # (3,) half extents along the shape's axes
-    radius: float  # m  0 for a box
+    radius: float
 
 
 @dataclass(frozen=True, eq=False)
 class UrdfLink:
-    """A link; meshes are not read."""
+    """A link; of its collision shapes only spheres and boxes are read."""
 
     name: str
     inertial: Inertial | None
-    solids: tuple[Solid, ...]
+    spheres: tuple[Sphere, ...]
     box: Array | None  # (3,) m  extents along the link's axes of its first collision or visual box
 
 
@@ -120,7 +117,7 @@ def _named(root: ET.Element, kind: str, where: str) -> dict[str, ET.Element]:
 
 
 def _link(element: ET.Element, where: str, ignored: Counter[str]) -> UrdfLink:
-    solids, boxes = [], []
+    spheres, boxes = [], []
     for tag in ("collision", "visual"):
         for shape in element.findall(tag):
             at = f"{where}: {tag}"
@@ -129,22 +126,10 @@ def _link(element: ET.Element, where: str, ignored: Counter[str]) -> UrdfLink:
                 ignored["mesh"] += geometry.tag == "mesh"
                 if geometry.tag == "box":
                     boxes.append(np.abs(R) @ numbers(geometry, "size", None, at))
-                if tag == "collision" and geometry.tag in ("box", "cylinder", "sphere", "capsule"):
-                    solids.append(_solid(geometry, p, R, at))
+                if tag == "collision" and geometry.tag == "sphere":
+                    spheres.append(Sphere(p, number(geometry, "radius", None, at)))
     box = boxes[0] if boxes else None
-    return UrdfLink(element.get("name", ""), _inertial(element, where), tuple(solids), box)
-
-
-def _solid(geometry: ET.Element, centre: Array, rotation: Array, where: str) -> Solid:
-    """Returns a shape; the axis of a cylinder or capsule is its z."""
-    if geometry.tag == "box":
-        return Solid("box", centre, rotation, 0.5 * numbers(geometry, "size", None, where), 0.0)
-    radius = number(geometry, "radius", None, where)
-    along = radius
-    if geometry.tag != "sphere":
-        along = 0.5 * number(geometry, "length", None, where)
-        along += radius if geometry.tag == "capsule" else 0.0
-    return Solid(geometry.tag, centre, rotation, np.array([radius, radius, along]), radius)
+    return UrdfLink(element.get("name", ""), _inertial(element, where), tuple(spheres), box)
 
 
 def _inertial(link: ET.Element, where: str) -> Inertial | None:

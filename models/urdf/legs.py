@@ -184,7 +184,7 @@ def foot_of(tibia: Body) -> tuple[Array | None, float | None]:
 
     It is the outermost collision sphere, else the outermost fixed link.
     """
-    spheres = [solid for solid in tibia.solids if solid.kind == "sphere"]
+    spheres = tibia.spheres
     if spheres:
         outermost = max(spheres, key=lambda sphere: float(np.linalg.norm(sphere.centre)))
         return outermost.centre, outermost.radius

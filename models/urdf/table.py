@@ -57,7 +57,7 @@ from hexapod_cosim.models.urdf.assumed import (
     assume_stances,
     equivalent_box,
 )
-from hexapod_cosim.models.urdf.bodies import Body, collision_body, root_body
+from hexapod_cosim.models.urdf.bodies import Body, root_body
 from hexapod_cosim.models.urdf.elements import DAMPING, Urdf, extension_tables, parse_urdf
 from hexapod_cosim.models.urdf.legs import FoundLeg, find_legs, inertia_entries
 
@@ -149,13 +149,14 @@ def urdf_table(
         urdf.extension is not None and urdf.extension.get("frames") == "ours"
     )
     root = root_body(urdf)
-    torso, body, legs = _found(root, urdf, options.forward, keep_frames=keep)
+    torso, legs = _found(root, urdf, options.forward, keep_frames=keep)
     above = merged_tables(_shaped(own), _spread(side, where or str(path)))
-    table = merged_tables(merged_tables(_assumed(), _measured(urdf, torso, body, legs)), above)
+    table = merged_tables(merged_tables(_assumed(), _measured(urdf, torso, legs)), above)
     _refuse_footless(legs, table, urdf.where)
     assumed = [name for name in WHOLE if name not in own and name not in side]
     assumed += _complete(table, legs, urdf)
-    table["source"] = _source(urdf, legs, assumed, body) | dict(side.get("source", {}))
+    bare = "body" not in own and "body" not in side
+    table["source"] = _source(urdf, legs, assumed, bare=bare) | dict(side.get("source", {}))
     return table
 
 
@@ -178,8 +179,8 @@ def _assumed() -> Table:
 
 def _found(
     root: Body, urdf: Urdf, forward: str, *, keep_frames: bool
-) -> tuple[Table, Table, list[FoundLeg]]:
-    """Returns the tables of torso and body, and the legs.
+) -> tuple[Table, list[FoundLeg]]:
+    """Returns the table of the torso, and the legs.
 
     The torso's frame lies at its heaviest link, with the root link's axes rotated to the forward
     direction.
@@ -196,11 +197,7 @@ def _found(
         "inertia": inertia_entries(axes.T @ inertial.inertia @ axes + 0.0),
     }
     torso["size"] = _box(root, axes, torso) or equivalent_box(torso["mass"], torso["inertia"])
-    legs = find_legs(root, origin, axes, keep_frames=keep_frames, where=urdf.where)
-    limbs = [
-        (leg.servo[1].body, leg.servo[2].body, leg.foot) for leg in legs if leg.foot is not None
-    ]
-    return torso, collision_body(root, origin, axes, limbs), legs
+    return torso, find_legs(root, origin, axes, keep_frames=keep_frames, where=urdf.where)
 
 
 def _refuse_footless(legs: list[FoundLeg], table: Table, where: str) -> None:
@@ -228,12 +225,12 @@ def _box(root: Body, axes: Array, torso: Table) -> list[float] | None:
     return [float(edge) for edge in largest] if np.linalg.norm(largest) > gyration else None
 
 
-def _measured(urdf: Urdf, torso: Table, body: Table, legs: list[FoundLeg]) -> Table:
+def _measured(urdf: Urdf, torso: Table, legs: list[FoundLeg]) -> Table:
     """Returns the data of the URDF."""
     table: Table = {
         "name": urdf.name,
         "torso": torso,
-        "body": body,
+        "body": {},
         "legs": {leg.name: leg.table for leg in legs},
         "servo": {},
         "foot": {},
@@ -353,7 +350,7 @@ def _drop(leg: Table) -> float:
     return max(z, 1e-3)
 
 
-def _source(urdf: Urdf, legs: list[FoundLeg], assumed: list[str], body: Table) -> Table:
+def _source(urdf: Urdf, legs: list[FoundLeg], assumed: list[str], *, bare: bool) -> Table:
     source = {"robot": f"read from the URDF of {urdf.name!r}"}
     source |= {f"leg {leg.name}": f"{JOINTS}{', '.join(leg.joints)}" for leg in legs}
     other_way = [name for leg in legs for name in leg.reversed]
@@ -361,10 +358,8 @@ def _source(urdf: Urdf, legs: list[FoundLeg], assumed: list[str], body: Table) -
         source["URDF, angles"] = f"counted against the URDF's axes: {', '.join(other_way)}"
     if assumed:
         source["URDF, assumed"] = f"the URDF does not say, so assumed: {', '.join(assumed)}"
-    if body:
-        source["URDF, body"] = (
-            "from collision shapes: the torso's box encloses them, all legs have the largest radii"
-        )
+    if bare:
+        source["URDF, body"] = "only the feet touch the ground; [body] of a robot file gives more"
     counts = [f"{count} {name}" for name, count in sorted(urdf.ignored.items()) if count]
     ignored = ", ".join(counts)
     return source | (

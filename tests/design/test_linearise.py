@@ -1,5 +1,5 @@
 """Tests that the linearised FMU agrees with the FMU for small motions and with closed forms for a
-standing robot, and that the designed loop on the FMU goes as the linear loop predicts.
+standing robot.
 """
 
 from __future__ import annotations
@@ -8,14 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from design_check import check_design
 
-from hexapod_cosim.controller import Gains, LegSolver
-from hexapod_cosim.controller.design.closed import disturbed
-from hexapod_cosim.controller.design.loci import worst_margins
-from hexapod_cosim.controller.design.paper import PaperLoops, scaled, shifted
+from hexapod_cosim.controller import LegSolver
+from hexapod_cosim.controller.design.paper import shifted
+from hexapod_cosim.controller.design.plots import disturbed
 from hexapod_cosim.controller.design.standing import ANGLES, StandingPlant, weight_share
-from hexapod_cosim.cosim.design.gains import STANCES, design_for, level_fmu, standing_plants
+from hexapod_cosim.cosim.design.gains import STANCES, level_fmu
 from hexapod_cosim.cosim.design.linearise import STATES, Bench, linearise
 from hexapod_cosim.cosim.design.standing import StanceError, rest
 from hexapod_cosim.cosim.interface.names import foot_vector_names
@@ -156,60 +154,3 @@ def test_legs_that_do_not_hold_the_robot_are_refused() -> None:
         ),
     ):
         rest(fmu, robot, standing=("LF", "LM"), load=1.0)
-
-
-# The designed loop on the FMU: a small spread of the feet goes as the linear loop predicts.
-
-AGREEMENT = 5e-3  # 1    of the largest force
-NEEDS_DESIGN_CHECK = pytest.mark.usefixtures("plant_build")
-
-
-@pytest.fixture(scope="module")
-def gains(plant_build: object) -> Gains:
-    return design_for(load_robot("athena"), PERIOD)
-
-
-@NEEDS_DESIGN_CHECK
-@pytest.mark.parametrize("stance", ["six legs", "tripod LF LR RM"])
-def test_a_small_spread_goes_as_the_linear_loop_predicts(gains: Gains, stance: str) -> None:
-    check = check_design(load_robot("athena"), gains, stance=stance)
-    assert check.error < AGREEMENT
-    assert check.simulated.max() > 500.0  # N/m    of legs and feet that creep
-
-
-@NEEDS_DESIGN_CHECK
-def test_a_large_spread_does_not(gains: Gains) -> None:
-    """The FMU's loop is not linear: friction saturates."""
-    assert check_design(load_robot("athena"), gains, spread=0.01).error > 4.0 * AGREEMENT
-
-
-@NEEDS_DESIGN_CHECK
-@pytest.mark.parametrize(("by", "grows"), [(0.8, False), (1.25, True)])
-@pytest.mark.parametrize(
-    ("stance", "load", "feet", "kind"),
-    [("tripod LF LR RM", 0.1, 3, "gain"), ("six legs", 1.0, 6, "static")],
-)
-def test_a_disturbance_of_the_fmu_grows_where_the_margin_ends(
-    gains: Gains, stance: str, load: float, feet: int, kind: str, by: float, grows: bool
-) -> None:
-    """Three feet shake, six push against each other.
-
-    by: shares over those at which the margin says that the standing robot becomes unstable.
-    """
-    robot = load_robot("athena")
-    loops = PaperLoops(robot, standing_plants(robot, PERIOD), gains.requirements, period=PERIOD)
-    loci = loops.loci(f"{stance}, load {load:g}, gears slip", gains.paper)
-    critical = 10.0 ** (getattr(worst_margins(loci, loops.omega), kind) / 20.0)
-    check = check_design(
-        robot,
-        replace(gains, paper=scaled(gains.paper, by * critical)),
-        stance=stance,
-        load=load,
-        gears_stick=False,
-        push=np.eye(3 * feet)[2],  # the first foot upwards
-        spread=1e-6,
-    )
-    third = len(check.time) // 3
-    for force in (check.predicted, check.simulated):
-        change = abs(np.diff(force))
-        assert bool(change[2 * third :].max() > change[third : 2 * third].max()) is grows

@@ -113,41 +113,12 @@ def reread(root: ET.Element, tmp_path: Path) -> Robot:
     return load_robot(path)
 
 
-def test_collision_shapes_alone_give_the_outer_box_and_the_largest_radii(tmp_path: Path) -> None:
+def test_without_its_table_the_body_touches_nothing(tmp_path: Path) -> None:
     robot = reread(without_body(robot_to_urdf(load_robot("athena"))), tmp_path)
-    assert robot.body.torso_box == pytest.approx((0.18, 0.10, 0.04), abs=1e-15)
-    assert robot.body.torso_centre == pytest.approx((0.0, 0.0, 0.0), abs=1e-15)
-    assert (robot.body.corner_radius, robot.body.contact) == (0.0, "on")
-    assert (robot.body.knee_radius, robot.body.shank_radius) == (0.0105, 0.0105)
-    assert robot.body.shank_position == pytest.approx(0.5, abs=1e-15)
-    assert "torso's box encloses" in robot.source["URDF, body"]
-
-
-def test_cylinders_capsules_and_spheres_are_read(tmp_path: Path) -> None:
-    root = without_body(robot_to_urdf(load_robot("athena")))
-    for link in root.findall("link"):
-        name = link.get("name", "")
-        for shape in link.findall("collision"):
-            if not name.endswith("foot"):
-                link.remove(shape)
-        if name == "torso":
-            add(link, "sphere", "0.1 0 0.05", radius="0.04")
-            add(link, "capsule", "-0.1 0 0", radius="0.03", length="0.1")
-        if name.endswith("femur"):
-            add(link, "cylinder", "0.05 0 0", radius="0.02", length="0.1")
-        if name.endswith("tibia"):
-            add(link, "capsule", "0.04 0 0", radius="0.012", length="0.06")
-    body = reread(root, tmp_path).body
-    assert body.torso_box == pytest.approx((0.135, 0.04, 0.085), abs=1e-15)
-    assert body.torso_centre == pytest.approx((0.005, 0.0, 0.005), abs=1e-15)
-    assert (body.knee_radius, body.shank_radius) == (0.02, 0.012)
-    assert body.shank_position == pytest.approx(0.25, abs=1e-15)
-
-
-def add(link: ET.Element, kind: str, place: str, **size: str) -> None:
-    shape = ET.SubElement(link, "collision")
-    ET.SubElement(shape, "origin", xyz=place)
-    ET.SubElement(ET.SubElement(shape, "geometry"), kind, size)
+    assert robot.body == BodyContact()
+    assert robot.source["URDF, body"] == (
+        "only the feet touch the ground; [body] of a robot file gives more"
+    )
 
 
 @pytest.mark.parametrize(
