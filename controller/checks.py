@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.walk.gait import Gait
-from hexapod_cosim.models import HexapodError, Robot, unknown_name
+from hexapod_cosim.models import HexapodError, unknown_name
 
 LAWS = ("compliant", "paper")  # what the feet's forces do; without gains control is kinematic
 
@@ -29,11 +28,3 @@ def check_law(law: str) -> None:
     """Raises HexapodError for an unknown name."""
     if law not in LAWS:
         raise unknown_name("law", law, LAWS)
-
-
-def gains_warnings(robot: Robot, gains: Gains | None, period: float) -> tuple[str, ...]:
-    """Returns warnings of gains for another robot or period [s], and the caveats of the gains."""
-    if gains is None:
-        return ()
-    mismatch = gains.mismatch(robot, period=period)
-    return (*(() if mismatch is None else (mismatch,)), *gains.caveats)

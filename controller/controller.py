@@ -19,7 +19,6 @@ from hexapod_cosim.controller.checks import (
     ControllerError,
     check_law,
     check_period,
-    gains_warnings,
 )
 from hexapod_cosim.controller.comply.compliant import Compliant, sense
 from hexapod_cosim.controller.comply.paper import Paper, Step
@@ -75,7 +74,7 @@ class Controller(Stateful):
         self._build(gait)
         self._next: Gait | None = None  # that the legs change to
         self._back: int | None = None  # leg that is taken back into service then
-        self.warnings = gains_warnings(robot, gains, period)
+        self.warnings = gains.warnings(robot, period=period) if gains else ()
         self._out = JointCommand()
         self.diagnostics = Diagnostics()
         self._start: float | None = None  # s    time of the first step
@@ -156,7 +155,7 @@ class Controller(Stateful):
         """
         check_law(law)
         self.gains, self.law = gains, law
-        self.warnings = gains_warnings(self.robot, gains, self.period)
+        self.warnings = gains.warnings(self.robot, period=self.period) if gains else ()
         plan, self.health = self.plan, Health(self.robot, gains, legs=self.legs, period=self.period)
         self._build(self.gait)
         if self._start is None:

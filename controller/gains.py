@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 from typing import Annotated, Any
 
 from hexapod_cosim.models import HexapodError, Robot
-from hexapod_cosim.models.schema import Flag, Number, Text
+from hexapod_cosim.models.schema import Flag, Number, Text, Texts
 
 Switch = Annotated[bool, Flag()]
 Real = Annotated[float, Number("SI unit")]
@@ -206,7 +206,8 @@ class LimitGains:
 class Requirements:
     """Requirements of a design. The defaults suit legs of 0.22 to 0.44 m; for others: size.py."""
 
-    phase_margin: Positive = 60.0  # deg    of the paper's control, at least
+    # deg    of the paper's control, at least; no loop with a crossing has 180
+    phase_margin: Annotated[float, Number("deg", above=0.0, below=180.0)] = 60.0
     gain_margin: NotNegative = 5.0  # dB    the same
     static_margin: NotNegative = 3.0  # dB    the same, of feet that push against each other
     delay_periods: NotNegative = 1.0  # 1    computing delay in controller periods
@@ -264,7 +265,8 @@ class Gains:
     limits: LimitGains
     paper: PaperGains
     margins: Margins
-    caveats: tuple[str, ...] = ()  # stances that are left out, and why; what was not reached
+    # stances that are left out, and why; what was not reached
+    caveats: Annotated[tuple[str, ...], Texts()] = ()
 
     def as_facts(self) -> dict[str, Any]:
         """Returns the gains as nested dictionaries, as dataclasses.asdict() does in more time."""
@@ -273,17 +275,18 @@ class Gains:
             for name, value in vars(self).items()
         }
 
-    def mismatch(self, robot: Robot, *, period: float) -> str | None:
-        """Returns why these gains are not for this robot and period [s]; None when they are."""
+    def warnings(self, robot: Robot, *, period: float) -> tuple[str, ...]:
+        """Returns why these gains are not for this robot and period [s], and the caveats."""
+        other: tuple[str, ...] = ()
         if self.robot_hash != robot.hash:
             designed, present = self.robot_hash[:12], robot.hash[:12]
-            return (
+            other = (
                 f"the gains were designed for robot {self.robot!r} ({designed}), "
-                f"not for {robot.name!r} ({present})"
+                f"not for {robot.name!r} ({present})",
             )
-        if not math.isclose(self.period, period, rel_tol=1e-9):
-            return f"the gains were designed for a period of {self.period} s, not {period} s"
-        return None
+        elif not math.isclose(self.period, period, rel_tol=1e-9):
+            other = (f"the gains were designed for a period of {self.period} s, not {period} s",)
+        return other + self.caveats
 
 
 SECTIONS: dict[str, type[Any]] = {

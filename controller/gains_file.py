@@ -14,7 +14,6 @@ from hexapod_cosim.models import RobotError
 from hexapod_cosim.models.errors import refuse_path
 from hexapod_cosim.models.files import read_text
 from hexapod_cosim.models.schema import (
-    Text,
     decoding_toml,
     parse_toml,
     read_given,
@@ -47,7 +46,7 @@ def save_gains(gains: Gains, path: str | Path) -> Path:
     Raises GainsError when the file cannot be written.
     """
     lines = ["# Gains of compliant and paper control, SI units; made by `hexapod design`."]
-    lines += [f"format = {FORMAT}", *_toml_lines(gains), f"caveats = {json.dumps(gains.caveats)}"]
+    lines += [f"format = {FORMAT}", *_toml_lines(gains)]
     for part in SECTIONS:
         lines += ["", f"[{part}]", *_toml_lines(getattr(gains, part))]
     target = Path(path)
@@ -66,10 +65,10 @@ def save_gains(gains: Gains, path: str | Path) -> Path:
 
 
 def _toml_lines(record: Any) -> list[str]:
-    """Returns a line for each number and text of a record; a margin without a limit has none."""
+    """Returns a line for each plain field of a record; a margin without a limit has none."""
     values = {key: getattr(record, key) for key in specs(type(record))}
     return [
-        f"{key} = {json.dumps(value) if isinstance(value, str) else repr(value)}"
+        f"{key} = {json.dumps(value) if isinstance(value, str | tuple) else repr(value)}"
         for key, value in values.items()
         if value != math.inf
     ]
@@ -108,8 +107,4 @@ def _read(table: dict[str, Any], where: str) -> Gains:
         name: read_record(kind, table.pop(name, None), f"{where}: [{name}]")
         for name, kind in SECTIONS.items()
     }
-    caveats = table.pop("caveats", [])
-    texts = caveats if isinstance(caveats, list) else [caveats]
-    known = tuple(Text().read(text, f"{where}: caveats") for text in texts)
-    head = require(Gains, read_given(Gains, table, where), where)
-    return Gains(**head, **parts, caveats=known)
+    return Gains(**require(Gains, read_given(Gains, table, where), where), **parts)

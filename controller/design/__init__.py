@@ -3,8 +3,8 @@
 Imports the rest of `controller`.
 """
 
+from hexapod_cosim.controller.design.paper import StandingPlant
 from hexapod_cosim.controller.design.plots import plot_design
-from hexapod_cosim.controller.design.standing import StandingPlant
 from hexapod_cosim.controller.design.synthesis import design_gains
 from hexapod_cosim.controller.gains_file import load_gains, save_gains
 

@@ -26,18 +26,46 @@ from hexapod_cosim.controller.design.loci import (
     tracked,
     worst_margins,
 )
-from hexapod_cosim.controller.design.standing import ANGLES, FORCES, JOINTS, StandingPlant
-from hexapod_cosim.controller.gains import PaperGains, Requirements
-from hexapod_cosim.controller.plane import LEGS, Array
+from hexapod_cosim.controller.gains import TRIPOD_LEGS, PaperGains, Requirements
+from hexapod_cosim.controller.plane import LEGS, Array, Mask
 from hexapod_cosim.controller.size import paper_gains, size_of
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
 
-Plants = Mapping[str, StandingPlant]
+JOINTS = 3
+ANGLES = FORCES = 3 * LEGS
 JUDGED = 200  # frequencies
 ROUNDING = 1e-9  # 1    of a period
 FREE_COORDINATES = 3  # x, y and yaw of the robot, which nothing controls
 BACK_OFF, BACK_OFFS = 0.95, 60  # 1    reduction of the shares at a missed margin, and attempts
+
+
+@dataclass(frozen=True, kw_only=True)
+class StandingPlant:
+    """The plant linearised about a pose in which some legs stand.
+
+    system: sampled at the controller's period, with inputs held over it. Inputs: 18 angle_ref, 18
+    speed_ref, 18 torque_ref. Outputs: 18 foot forces (ground on foot, world axes), then others.
+    The leg is the slowest index of each group.
+    """
+
+    system: control.StateSpace
+    angle: Array  # rad    (6, 3)
+    force: Array  # N    (6, 3) ground on foot
+    torque: Array  # N m    (6, 3) torque_ref of the servos
+    standing: Mask  # (6,)
+
+    def load(self, robot: Robot) -> Array:
+        """Returns the normal forces of the standing feet (n,) in thirds of the weight [1]."""
+        return np.asarray(self.force[self.standing, 2] / weight_share(robot))
+
+
+def weight_share(robot: Robot) -> float:
+    """Returns a third of the robot's weight [N], one leg's share while three legs stand."""
+    return robot.weight / TRIPOD_LEGS
+
+
+Plants = Mapping[str, StandingPlant]
 
 
 def shifted(robot: Robot, plant: StandingPlant) -> control.StateSpace:

@@ -16,10 +16,11 @@ from hexapod_cosim.controller.design.loci import Response, critical_size
 from hexapod_cosim.controller.design.paper import (
     PaperLoops,
     Plants,
+    StandingPlant,
     closed_loop,
     shifted,
+    weight_share,
 )
-from hexapod_cosim.controller.design.standing import StandingPlant, weight_share
 from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.plane import Array

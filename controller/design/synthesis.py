@@ -11,8 +11,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hexapod_cosim.controller.design.paper import PaperDesign, Plants, design_paper, meets
-from hexapod_cosim.controller.design.standing import StandingPlant
+from hexapod_cosim.controller.design.paper import (
+    PaperDesign,
+    Plants,
+    StandingPlant,
+    design_paper,
+    meets,
+)
 from hexapod_cosim.controller.gains import (
     Gains,
     GainsError,

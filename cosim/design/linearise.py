@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import control
 import numpy as np
 
-from hexapod_cosim.controller.design.standing import StandingPlant
+from hexapod_cosim.controller.design.paper import StandingPlant
 from hexapod_cosim.controller.size import Size, size_of
 from hexapod_cosim.cosim.interface.names import JOINTS, LEGS, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu

@@ -11,7 +11,7 @@ from itertools import count
 import numpy as np
 
 from hexapod_cosim.controller import LegSolver
-from hexapod_cosim.controller.design.standing import weight_share
+from hexapod_cosim.controller.design.paper import weight_share
 from hexapod_cosim.controller.plane import Mask
 from hexapod_cosim.controller.size import size_of
 from hexapod_cosim.cosim.design.linearise import ANGLES, LATEST, POSES, STATES, Bench, Motion

@@ -9,7 +9,6 @@ from functools import lru_cache
 from types import SimpleNamespace
 
 from hexapod_cosim.controller import Controller, Gains, Gait, Parts
-from hexapod_cosim.controller.checks import gains_warnings
 from hexapod_cosim.controller.size import requirements_for, sections_for
 from hexapod_cosim.cosim.common.components import CONTROLLER
 from hexapod_cosim.cosim.interface.plant import expand_interface, parameter_values
@@ -39,7 +38,7 @@ class ControllerSetup:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings about gains of another robot or period, as of the Python controller."""
-        return gains_warnings(self.robot, self.gains, self.period)
+        return self.gains.warnings(self.robot, period=self.period) if self.gains else ()
 
     def build(self) -> Controller:
         """Builds the Python controller. Raises RobotError or ControllerError for invalid values."""

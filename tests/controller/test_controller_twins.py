@@ -1,13 +1,18 @@
-"""The controllers in Python and C have the same files, constants and equations."""
+"""The controllers in Python and C have the same files, constants and equations, and few files name
+a part, so that it can be added or removed by editing these.
+"""
 
 from __future__ import annotations
 
 import ast
 import re
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from hexapod_cosim.controller import Parts
 
 ROOT = Path(__file__).resolve().parents[2]
 PYTHON, C = ROOT / "controller", ROOT / "controller/fmu/src"
@@ -76,3 +81,52 @@ def test_each_equation_of_the_pages_is_numbered_once_and_in_order() -> None:
 def test_each_equation_is_cited_and_each_citation_exists(folder: Path, kind: str) -> None:
     text = "\n".join(file.read_text(encoding="utf-8") for file in folder.rglob(kind))
     assert cited(text) == EQUATIONS
+
+
+MOST = 6  # files that name a part, of code and pages
+# what names a part in code: its switch, its modules, its structures and functions in C
+NAMES = {
+    "support": r"comply\.support|\bSupport\b|hx_support_|hxSupport|SupportGains|/support\.h",
+    "touchdown": r"sense\.touchdown|\bTouchdown\b|hx_touchdown_|hxTouchdown|/touchdown\.h",
+    "posture": r"walk\.hold|\bHold\b|hx_hold_|hxHold|HoldGains|/hold\.h",
+    "path": r"walk\.hold|\bHold\b|hx_hold_|hxHold|HoldGains|/hold\.h",
+    "sway": r"\bsway\b|\bSway\b|hx_sway_|hxSway",
+    "fallback": r"sense\.trust|\bTrust\b|hx_trust_|hxTrust|SensorWatch|hx_sensor_watch|/trust\.h",
+    "limits": r"\bLimitGains\b",
+    "squeeze": r"planned_squeeze|PlannedSqueeze",
+    "paper_share": r"\bpaper_share\b",
+    "paper_pid": r"\bpaper_pid\b",
+    "paper_suspension": r"\bpaper_suspension\b",
+}
+
+
+def sources() -> list[Path]:
+    """The files of the controller that are written by hand, and its pages."""
+    folders = (
+        (ROOT / "controller", "*.*"),
+        (ROOT / "docs", "control*.md"),
+        (ROOT / "docs/control", "*.md"),
+    )
+    kinds = {".py", ".c", ".h", ".toml", ".txt", ".md"}
+    files = {file for folder, name in folders for file in folder.rglob(name)}
+    return sorted(
+        file
+        for file in files
+        if file.suffix in kinds and not {"generated", "design"} & set(file.parts)
+    )
+
+
+def names(file: Path, part: str) -> bool:
+    """Whether a file names a part."""
+    switch = rf"`(compliance\.)?{part}\b"
+    if file.suffix != ".md":
+        switch = rf"parts(\.|->){part}\b|^    {part}: Annotated|{NAMES[part]}"
+    return re.search(switch, file.read_text(encoding="utf-8"), re.MULTILINE) is not None
+
+
+@pytest.mark.parametrize("part", [item.name for item in fields(Parts)])
+def test_a_part_is_named_in_six_files_at_most(part: str) -> None:
+    found = [file.relative_to(ROOT) for file in sources() if names(file, part)]
+    assert len(found) <= MOST, [str(file) for file in found]
+    assert Path("controller/gains.py") in found
+    assert {file.suffix for file in found} == {".py", ".h", ".md"}

@@ -21,7 +21,6 @@ from hexapod_cosim.controller import (
     make_gait,
     save_gains,
 )
-from hexapod_cosim.controller.checks import gains_warnings
 from hexapod_cosim.controller.comply.paper import Paper, Step
 from hexapod_cosim.controller.design import StandingPlant, design_gains, plot_design
 from hexapod_cosim.controller.design.loci import critical_size, loop_margins
@@ -33,7 +32,7 @@ from hexapod_cosim.controller.design.paper import (
     shifted,
 )
 from hexapod_cosim.controller.gains import Parts
-from hexapod_cosim.cosim.design.gains import design_for, read_requirements, standing_plants
+from hexapod_cosim.cosim.design.gains import design_for, examine_stances, read_requirements
 from hexapod_cosim.models import load_robot
 
 PERIOD = 0.005  # s
@@ -44,7 +43,7 @@ pytestmark = pytest.mark.usefixtures("plant_build")
 
 @cache
 def plants_of(name: str) -> dict[str, StandingPlant]:
-    return standing_plants(load_robot(name), PERIOD)
+    return examine_stances(load_robot(name), PERIOD)[0]
 
 
 @cache
@@ -179,7 +178,7 @@ def test_caveats_are_kept_and_warned_about(tmp_path: Path) -> None:
     gains = replace(designed("athena"), caveats=("the design leaves out a: b", 'and "c"'))
     path = save_gains(gains, tmp_path / "gains.toml")
     assert load_gains(path) == gains
-    assert gains_warnings(load_robot("athena"), gains, PERIOD) == (
+    assert gains.warnings(load_robot("athena"), period=PERIOD) == (
         "the design leaves out a: b",
         'and "c"',
     )

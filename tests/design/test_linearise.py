@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.controller import LegSolver
-from hexapod_cosim.controller.design.paper import shifted
+from hexapod_cosim.controller.design.paper import ANGLES, StandingPlant, shifted, weight_share
 from hexapod_cosim.controller.design.plots import disturbed
-from hexapod_cosim.controller.design.standing import ANGLES, StandingPlant, weight_share
 from hexapod_cosim.cosim.design.gains import STANCES, level_fmu
 from hexapod_cosim.cosim.design.linearise import STATES, Bench, linearise
 from hexapod_cosim.cosim.design.standing import StanceError, rest

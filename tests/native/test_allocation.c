@@ -186,6 +186,6 @@ int main(int count, char **arguments) {
   const long two = fail_each(walk_two), three = fail_each(walk_three);
   printf("allocations: FMI 2.0 %ld, FMI 3.0 %ld; largest %zu B\n", two, three, largest);
   CHECK(two >= 7 && three >= 6);
-  CHECK(largest < 300000); /* the plant with its work space, docs/architecture.md */
+  CHECK(largest < 350000); /* the plant with its work space, docs/architecture.md */
   return failures;
 }

@@ -82,16 +82,16 @@ def choose(
         if not fits or fits[key].angle <= (1.0 + WORTH) * min(one.angle for one in fits.values())
     )
     progress(f"{model}, all logs and {len(parts)} times without one {by}")
-    whole = pool.submit(fit_servo, logs, robot, model)
     seen_parts, unseen_parts = zip(*parts, strict=True)
     judgements = pool.map(
         _fitted_and_judged, seen_parts, unseen_parts, repeat(robot), repeat(model)
     )
+    whole = fit_servo(logs, robot, model)  # here, while the pool judges
     pairs = [
         pair for own, one in zip(unseen_parts, judgements, strict=True)
         for pair in zip(own, one, strict=True)
     ]  # fmt: skip
-    return Choice(model=model, fit=whole.result(), held_out=tuple(pairs), models=fits)
+    return Choice(model=model, fit=whole, held_out=tuple(pairs), models=fits)
 
 
 def _fitted_and_judged(

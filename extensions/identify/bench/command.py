@@ -180,7 +180,7 @@ def write_replay(done: BenchReplay, folder: Path, *, command: str) -> list[Path]
     log = done.bench.logs[0]
     page = render(
         "log.html.jinja",
-        extension="identify",
+        package="hexapod_cosim.extensions.identify",
         title=f"Replay of {Path(log.where).name}",
         headline=f"{log.motor}, gain {log.register:g}, {log.trajectory}, {log.mass:g} kg at "
         f"{log.length:g} m",
