@@ -23,7 +23,7 @@ from benchmarks.environment_steps import steps_per_second, walking_action, ways
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.sensors import MEASURED
 from hexapod_cosim.cosim.master.signals import JOINT_COMMANDS
-from hexapod_cosim.extensions.gym.plants import export_plant, grounds
+from hexapod_cosim.extensions.gym.batch import export_plant, grounds
 from hexapod_cosim.extensions.gym.settings import JOINTS, RATE, EnvSettings
 from hexapod_cosim.models.records import Array
 

@@ -123,7 +123,7 @@ void hx_component_get_state(const hxComponent *component, void *bytes) {
 }
 
 hxStatus hx_component_set_state(hxComponent *component, const void *bytes) {
-  return hx_controller_set_state(&component->controller, bytes, hx_controller_state_size());
+  return hx_controller_set_state(&component->controller, bytes);
 }
 
 const hxContinuous *const hx_continuous = NULL;

@@ -1,8 +1,8 @@
 """Runs many environments in C (loop/src/environments.c), over threads.
 
-`Batch` owns the FMUs, the memory that is exchanged with C and the threads. An action array goes in,
-arrays of observations, rewards and flags come out; all of them are views of the memory that C reads
-and writes.
+`Batch` owns the plant's FMU, the memory that is exchanged with C and the threads. An action array
+goes in, arrays of observations, rewards and flags come out; all of them are views of the memory
+that C reads and writes.
 """
 
 from __future__ import annotations
@@ -10,17 +10,18 @@ from __future__ import annotations
 import ctypes as ct
 import weakref
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.controller import DEFAULT_PERIOD
 from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.native_loop import step_functions
-from hexapod_cosim.cosim.master.sensors import MEASURED
-from hexapod_cosim.cosim.master.signals import COMMANDS, JOINT_COMMANDS, PUSH
+from hexapod_cosim.cosim.master.signals import JOINT_COMMANDS, PUSH
 from hexapod_cosim.cosim.run.worker_pool import processor_count
 from hexapod_cosim.extensions.gym.checks import check_count, check_names, check_seeds, checked_mask
 from hexapod_cosim.extensions.gym.native import (
@@ -31,28 +32,59 @@ from hexapod_cosim.extensions.gym.native import (
     NativeArrays,
     NativeDraws,
     NativeFmu,
-    NativeGround,
     NativeSettings,
     Owned,
     environments_library,
 )
-from hexapod_cosim.extensions.gym.plants import (
-    SPACING,
-    export_base,
-    export_plant,
-    ground_maps,
-    grounds,
-    start_height,
-    surfaces,
-)
 from hexapod_cosim.extensions.gym.settings import BLOCKS, JOINTS, RATE, REASONS, TERMS, EnvSettings
-from hexapod_cosim.models import FmuError, HexapodError, Robot
+from hexapod_cosim.models import FmuError, HexapodError, Robot, load_robot
+from hexapod_cosim.models.ground.faces import surface_of
+from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.table import merged_terrain
+from hexapod_cosim.models.statics import settled
+from hexapod_cosim.models.validation.bodies import check_settings
 
 FAILED = REASONS.index("failed")
 MESSAGE_SIZE = 512
 STARTS = 20  # episodes in a row that a plant may refuse to start before a reset is an error
 GROUND = "terrain.grid"  # the parameter that chooses one of several grounds, from 1
 Array = NDArray[Any]
+
+
+def grounds(settings: EnvSettings) -> tuple[Robot, ...]:
+    """Returns the robot on each of the environment's grounds. Raises HexapodError."""
+    own = load_robot(settings.robot)
+    foot = replace(own.foot, pad_radius=settings.pad_radius or own.foot.pad_radius)
+    solver = replace(
+        own.solver,
+        method=settings.solver,
+        tolerance=settings.tolerance,
+        step_max=settings.step_max,
+    )
+    found = []
+    for seed in range(1, settings.terrain_seeds + 1):
+        given = dict(settings.terrain) | ({"seed": seed} if settings.terrain_seeds > 1 else {})
+        terrain = merged_terrain(own.terrain, given, "terrain")
+        robot = replace(own, foot=foot, solver=solver, terrain=terrain)
+        check_settings(robot, where="environment")
+        found.append(robot)
+    return tuple(found)
+
+
+def surfaces(robots: Sequence[Robot]) -> list[Surface]:
+    """Returns the different surfaces of robots, in the order of their numbers in the FMU."""
+    given = [surface_of(robot.terrain) for robot in robots]
+    return list(dict.fromkeys(one for one in given if one is not None))
+
+
+def start_height(robots: Sequence[Robot]) -> float:
+    """Returns the height [m] of the torso at which no foot is deep in any of the grounds."""
+    return max(float(settled(robot)[0][2]) for robot in robots)
+
+
+def export_plant(robots: Sequence[Robot], folder: Path) -> Path:
+    """Exports the plant's FMU with all grounds. Raises HexapodError."""
+    return export_fmu(robots[0], folder / "plant.fmu", terrains=surfaces(robots))
 
 
 class Batch(Closing):
@@ -69,7 +101,7 @@ class Batch(Closing):
     weighted terms of the reward; `terminated`, `truncated` and `refused` (count,), bool; `reason`
     (count,), an index of REASONS.
 
-    Raises HexapodError for settings that describe no possible robot, ground or controller.
+    Raises HexapodError for settings that describe no possible robot or ground.
     """
 
     def __init__(
@@ -95,16 +127,13 @@ class Batch(Closing):
             raise
 
     def _open(self) -> None:
-        """Exports and loads the FMUs, creates the environments and starts the threads."""
+        """Exports and loads the plant, creates the environments and starts the threads."""
         robots = grounds(self.settings)
         self.robot = robots[0]
         with TemporaryFolder("gym") as folder:
-            fmus = self._owned.fmus
-            fmus.append(Fmu(export_plant(robots, folder)))
-            if self.settings.base != "stance":
-                fmus.append(Fmu(export_base(self.settings, self.robot, folder)))
+            plant = self._owned.plant = Fmu(export_plant(robots, folder))
         self._allocate()
-        native = self._native_settings(robots)
+        native = self._native_settings(robots, plant)
         arrays = NativeArrays(**{name: getattr(self, name).ctypes.data for name in ARRAYS})
         message = ct.create_string_buffer(MESSAGE_SIZE)
         self._library = environments_library()
@@ -147,23 +176,21 @@ class Batch(Closing):
         self._kept.append(texts)
         return NativeFmu(**calls, **texts)
 
-    def _native_settings(self, robots: Sequence[Robot]) -> Any:
+    def _native_settings(self, robots: Sequence[Robot], plant: Fmu) -> Any:
         """Returns the settings as C reads them."""
-        given, plant = self.settings, self._owned.fmus[0]
+        given = self.settings
         stance = np.array([leg.stance for leg in self.robot.legs])
         commands = (given.command_vx, given.command_vy, given.command_yaw_rate)
         native = NativeSettings(
             plant=self._fmu(plant),
             plant_output=self._references(plant, OUTPUTS),
             plant_input=self._references(plant, [*JOINT_COMMANDS, *PUSH[:3]]),
-            draws=self._draws(robots),
+            draws=self._draws(robots, plant),
             h=1.0 / RATE,
-            substeps=1,
             length=given.steps,
             stance=(ct.c_double * JOINTS)(*stance.ravel()),
             action_scale=(ct.c_double * JOINTS)(*[given.action_scale] * JOINTS),
             clock=given.clock,
-            command_interval=round(given.command_interval * RATE),
             command_low=tuple(low for low, _ in commands),
             command_high=tuple(high for _, high in commands),
             push_interval=round(given.push_interval * RATE) if given.push_force else 0,
@@ -177,42 +204,9 @@ class Batch(Closing):
         )
         for place, name in enumerate(BLOCKS):
             native.observed[place][:] = np.broadcast_to(given.observation.get(name, 0.0), 3)
-        if "heights" in given.observation:
-            native.ground = self._ground(robots)
-        if len(self._owned.fmus) > 1:
-            self._add_controller(native)
         return native
 
-    def _ground(self, robots: Sequence[Robot]) -> Any:
-        """Returns the heights that robots observe, as C reads them."""
-        maps, places = ground_maps(self.settings, robots), self.settings.places
-        names, number = self.drawn_names, GROUND
-        count, rows, columns = maps.height.shape
-        return NativeGround(
-            height=self._keep(maps.height, np.float32),
-            place=self._keep(places, float),
-            count=count,
-            rows=rows,
-            columns=columns,
-            points=len(places),
-            draw=names.index(number) if number in names else len(names),
-            x0=maps.first,
-            y0=maps.first,
-            spacing=SPACING,
-            clearance=maps.clearance,
-        )
-
-    def _add_controller(self, native: Any) -> None:
-        """Adds the controller to the settings as C reads them."""
-        controller = self._owned.fmus[1]
-        native.controller = self._fmu(controller)
-        sensed = [*MEASURED["angle"], *MEASURED["foot_force"], *MEASURED["quaternion"]]
-        native.controller_input = self._references(controller, [*COMMANDS, *sensed])
-        native.controller_output = self._references(controller, JOINT_COMMANDS)
-        native.substeps = round(1.0 / (RATE * DEFAULT_PERIOD))
-        native.h = DEFAULT_PERIOD
-
-    def _draws(self, robots: Sequence[Robot]) -> Any:
+    def _draws(self, robots: Sequence[Robot], plant: Fmu) -> Any:
         """Returns the parameters that are drawn for each episode, as C reads them."""
         drawn: dict[str, tuple[float, float, bool]] = {
             name: (low, high, False) for name, (low, high) in self.settings.randomise.items()
@@ -225,10 +219,10 @@ class Batch(Closing):
         self.drawn_names = tuple(drawn)
         for name, ends in self.settings.randomise.items():
             for value in ends:  # refused at once, not at the start of an episode
-                self._owned.fmus[0].set_parameters({name: float(value)})
+                plant.set_parameters({name: float(value)})
         low, high, whole = ([ends[place] for ends in drawn.values()] for place in range(3))
         return NativeDraws(
-            reference=self._references(self._owned.fmus[0], self.drawn_names),
+            reference=self._references(plant, self.drawn_names),
             low=self._keep(low, float),
             high=self._keep(high, float),
             whole=self._keep(whole, np.int32),

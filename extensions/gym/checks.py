@@ -34,17 +34,6 @@ def check_names(names: Iterable[str], what: str, valid: Iterable[str]) -> None:
             raise unknown_name(what, name, list(valid))
 
 
-def check_number(
-    name: str, value: object, *, above: float = -math.inf, least: float = -math.inf
-) -> None:
-    """Checks that a value is a finite number that is above one bound and not below another."""
-    given = numbers(value) if isinstance(value, Real) else []
-    bound = f", above {above:g}" if above > -math.inf else ""
-    bound += f", {least:g} or above" if least > -math.inf else ""
-    holds = len(given) == 1 and above < given[0] >= least
-    check(holds, name, value, f"a finite number{bound}")
-
-
 def check_range(name: str, given: object) -> None:
     """Checks that both ends of a range are finite and in order."""
     ends = numbers(given)

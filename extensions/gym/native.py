@@ -28,8 +28,7 @@ CALLS = {
 PATH = Path(__file__).parent / "loop" / "include" / "hexapod" / "environments.h"
 HEADER = Header(PATH, base=loop_header())
 NativeFmu, NativeDraws = HEADER.types["hxEnvFmu"], HEADER.types["hxEnvDraws"]
-NativeGround, NativeSettings = HEADER.types["hxEnvGround"], HEADER.types["hxEnvSettings"]
-NativeArrays = HEADER.types["hxEnvArrays"]
+NativeSettings, NativeArrays = HEADER.types["hxEnvSettings"], HEADER.types["hxEnvArrays"]
 ARRAYS = tuple(name for name, _ in NativeArrays._fields_)
 AUTORESET = ("next_step", "same_step", "disabled")  # hxAutoreset
 # outputs of the plant in the order of hxEnvPlace
@@ -58,14 +57,14 @@ def environments_library() -> ct.CDLL:
 
 @dataclass
 class Owned:
-    """Threads, environments and FMUs of one batch.
+    """Threads, environments and the plant's FMU of one batch.
 
     It has no reference to the batch, so that a batch that nobody closed can be freed by it.
     """
 
     handle: int | None = None  # of hxEnvironments
     servers: list[threading.Thread] = field(default_factory=list)
-    fmus: list[Fmu] = field(default_factory=list)
+    plant: Fmu | None = None
     process: int = field(default_factory=os.getpid)  # that made them
 
     def serve(self, count: int) -> None:
@@ -93,7 +92,7 @@ class Owned:
             for server in self.servers:
                 server.join()
             environments_library().hx_environments_destroy(handle)
-        for fmu in self.fmus:
-            fmu.close()
+        if self.plant:
+            self.plant.close()
         self.servers.clear()
-        self.fmus.clear()
+        self.plant = None

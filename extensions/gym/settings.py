@@ -13,7 +13,6 @@ from hexapod_cosim.extensions.gym.checks import (
     check,
     check_count,
     check_names,
-    check_number,
     check_range,
     numbers,
 )
@@ -21,12 +20,9 @@ from hexapod_cosim.models.schema import Number, check_record
 
 JOINTS = 18
 RATE = 50  # Hz  of actions
-MOST_PLACES = 10_000  # whose heights are observed
-BASES = ("stance", "kinematic", "compliant")  # what actions are added to
 
 LARGEST = 100.0  # of an observation's values (HX_ENV_LARGEST in C)
-# Blocks of an observation in their order, with their sizes (hxEnvBlock in C). The size of the
-# heights is the number of places that are scanned.
+# Blocks of an observation in their order, with their sizes (hxEnvBlock in C).
 BLOCKS: Mapping[str, int] = {
     "velocity": 3,
     "rotation": 3,
@@ -36,10 +32,9 @@ BLOCKS: Mapping[str, int] = {
     "speed": JOINTS,
     "action": JOINTS,
     "clock": 2,
-    "heights": 0,
 }
 # largest values before the scale, of blocks that have one
-LIMITS: Mapping[str, float] = {"gravity": 1.0, "action": 1.0, "clock": 1.0, "heights": 1.0}
+LIMITS: Mapping[str, float] = {"gravity": 1.0, "action": 1.0, "clock": 1.0}
 # Terms of the reward in their order (hxEnvTerm in C), with the names that legged_gym uses where it
 # has the term.
 TERMS = (
@@ -63,7 +58,6 @@ REASONS = ("", "time", "tilted", "belly", "failed")
 MAPPINGS = ("terrain", "observation", "rewards", "randomise")
 Positive = Annotated[float, Number("1", above=0.0)]
 Length = Annotated[float, Number("m", at_least=0.0)]
-Spacing = Annotated[float, Number("m", above=0.0)]
 Angle = Annotated[float, Number("rad", above=0.0)]
 Force = Annotated[float, Number("N", at_least=0.0)]
 Duration = Annotated[float, Number("s", at_least=1.0 / RATE)]  # one step or more
@@ -82,8 +76,6 @@ LEGGED_GYM: Mapping[str, Scale] = {
     "speed": 0.05,
     "action": 1.0,
 }
-# The same with heights of the ground around the robot, as on legged_gym's uneven grounds.
-LEGGED_GYM_HEIGHTS: Mapping[str, Scale] = {**LEGGED_GYM, "heights": 5.0}
 # What a robot can measure, and a clock: the observation of policies that are exported as FMUs
 # (extensions/gym/policy_fmu/src/policy.c computes the same).
 MEASURABLE: Mapping[str, Scale] = {
@@ -95,7 +87,6 @@ MEASURABLE: Mapping[str, Scale] = {
 }
 OBSERVATIONS: Mapping[str, Mapping[str, Scale]] = {
     "legged_gym": LEGGED_GYM,
-    "legged_gym_heights": LEGGED_GYM_HEIGHTS,
     "measurable": MEASURABLE,
 }
 REWARDS: Mapping[str, float] = {
@@ -123,20 +114,12 @@ class EnvSettings:
     )  # as [terrain] of a scenario; {}: the robot's own
     terrain_seeds: int = 1  # grounds with seeds 1, 2, ... to draw from, for kinds with a seed
     pad_radius: Length = 0.0  # of the feet on soil; 0: the robot's own
-    base: str = "stance"  # what actions are added to: the standing pose or a controller's commands
     action_scale: Angle = 0.4  # change of a joint's commanded angle for the action 1
     observation: Mapping[str, Scale] = field(default_factory=lambda: LEGGED_GYM)
     rewards: Mapping[str, float] = field(default_factory=lambda: REWARDS)  # weights of the terms
     tracking_width: tuple[float, float] = (0.1, 0.25)  # m/s, rad/s  of the tracking terms
     clock: Annotated[float, Number("Hz", at_least=0.0)] = 1.5
     duration: Duration = 20.0  # of an episode
-    # a grid of places around the torso whose heights are observed
-    scan_length: Length = 0.8  # forward and back, from end to end
-    scan_width: Length = 0.5  # to the sides
-    scan_spacing: Spacing = 0.05
-    command_interval: Annotated[float, Number("s", at_least=0.0)] = (
-        0.0  # s  from one draw of the command to the next; 0: the episode
-    )
     command_vx: Range = (0.0, 0.15)  # m/s
     command_vy: Range = (-0.05, 0.05)  # m/s
     command_yaw_rate: Range = (-0.3, 0.3)  # rad/s
@@ -159,42 +142,33 @@ class EnvSettings:
             check(table, name, given, "a table (a dict) from names to values")
         check_names(self.rewards, "term of the reward", TERMS)
         check_names(self.observation, "block of the observation", BLOCKS)
-        check_names([self.base], "base of actions", BASES)
         check_record(self, "environment")
-        if self.command_interval:
-            check_number("command_interval", self.command_interval, least=1.0 / RATE)
         check_count("terrain_seeds", self.terrain_seeds)
         for name in ("command_vx", "command_vy", "command_yaw_rate"):
             check_range(name, getattr(self, name))
         for name, ends in self.randomise.items():
             check_range(f"randomise: {name}", ends)
         for name, weight in self.rewards.items():
-            check_number(f"rewards: {name}", weight)
+            check(len(numbers(weight)) == 1, f"rewards: {name}", weight, "a finite number")
         width = numbers(self.tracking_width)
         holds = len(width) == 2 and min(width) > 0.0
         check(holds, "tracking_width", self.tracking_width, "two finite numbers above 0")
         self._check_observation()
 
     def _check_observation(self) -> None:
-        """Checks the scales of the observed blocks, and the number of scanned places.
-
-        A scale of 0 would leave a block out.
-        """
+        """Checks the scales of the observed blocks. A scale of 0 would leave a block out."""
         check(bool(self.observation), "observation", "no blocks", f"some of {', '.join(BLOCKS)}")
         for name, scale in self.observation.items():
             sizes = {1, 3} if BLOCKS[name] == 3 else {1}
             holds = len(numbers(scale)) in sizes and any(numbers(scale))
             expected = "a finite scale other than 0, or three of them for a block of 3"
             check(holds, f"observation: {name}", scale, expected)
-        if "heights" in self.observation:
-            few = len(self.places) <= MOST_PLACES
-            check(few, "scan_spacing", self.scan_spacing, f"at most {MOST_PLACES} places")
 
     @property
     def blocks(self) -> dict[str, tuple[int, float]]:
         """Sizes and largest values before the scale of the observed blocks, in their order."""
         return {
-            name: (size or len(self.places), LIMITS.get(name, math.inf))
+            name: (size, LIMITS.get(name, math.inf))
             for name, size in BLOCKS.items()
             if name in self.observation
         }
@@ -205,25 +179,9 @@ class EnvSettings:
         return sum(size for size, _ in self.blocks.values())
 
     @property
-    def places(self) -> list[tuple[float, float]]:
-        """Places (forward, left) [m] whose heights are observed: rows from back to front, each from
-        right to left.
-        """
-        along, across = (
-            symmetric(extent, self.scan_spacing) for extent in (self.scan_length, self.scan_width)
-        )
-        return [(x, y) for x in along for y in across]
-
-    @property
     def steps(self) -> int:
         """Number of steps in a whole episode."""
         return round(self.duration * RATE)
-
-
-def symmetric(extent: float, spacing: float) -> list[float]:
-    """Returns coordinates [m] with a spacing, symmetric about 0, within an extent."""
-    half = math.floor(0.5 * extent / spacing + 1e-9)
-    return [spacing * number for number in range(-half, half + 1)]
 
 
 def changed(settings: EnvSettings, changes: Mapping[str, Any]) -> EnvSettings:
@@ -246,7 +204,6 @@ ROUGH = replace(
     FLAT,
     terrain={"kind": "rubble", "max_height": 0.03, "stone_size": 0.15},
     terrain_seeds=8,
-    observation=LEGGED_GYM_HEIGHTS,
     randomise={"friction.mu": (0.5, 0.9)},
 )
 SOIL = replace(FLAT, terrain={"kind": "sand", "soil": "dry_sand"}, pad_radius=0.025)

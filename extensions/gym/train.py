@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.gym.batch import Batch
-from hexapod_cosim.extensions.gym.checks import check_count, check_number, check_seeds
+from hexapod_cosim.extensions.gym.checks import check_count, check_seeds
 from hexapod_cosim.extensions.gym.policy import FREE, FREE_SIZE, INPUTS, Policy, symmetric_weights
-from hexapod_cosim.extensions.gym.settings import MEASURABLE, EnvSettings
+from hexapod_cosim.extensions.gym.settings import MEASURABLE, EnvSettings, Positive
+from hexapod_cosim.models.schema import check_record
 
 Array = NDArray[np.float64]
 FIRST, SECOND, TINY = 0.9, 0.99, 1e-8  # of Adam
@@ -44,17 +45,16 @@ WALKING = {
 class TrainSettings:
     """Settings of the training."""
 
-    minutes: float = 8.0  # of the clock on the wall
+    minutes: Positive = 8.0  # of the clock on the wall
     generations: int = 100_000  # at most
     pairs: int = 48  # of policies in a generation
-    size: float = 0.08  # of the random changes
-    rate: float = 0.03  # of Adam
+    size: Positive = 0.08  # of the random changes
+    rate: Positive = 0.03  # of Adam
     seed: int = 0
 
     def __post_init__(self) -> None:
         """Checks the numbers. Raises HexapodError."""
-        for name in ("minutes", "size", "rate"):
-            check_number(name, getattr(self, name), above=0.0)
+        check_record(self, "training")
         for name in ("generations", "pairs"):
             check_count(name, getattr(self, name))
         check_seeds([self.seed], 1)

@@ -48,8 +48,6 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         task: the registered name whose settings are used; the other keywords change them.
         threads: that step the robots; None: one for each core. Results do not depend on it.
         autoreset_mode: what follows the end of an episode.
-        copy: whether `reset` and `step` return copies of observations, rewards and flags. Without,
-            they return the arrays that the next call overwrites.
 
     A robot whose action is not finite does not step: `info["refused"]` marks it, its observation
     stays and its reward is 0. The info of a step also has `terms`, the weighted terms of the reward
@@ -65,13 +63,12 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         task: str = "Hexapod-v0",
         threads: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        copy: bool = True,
         **changes: Any,
     ) -> None:
         mode = checked_mode(autoreset_mode)
         check_count("number of environments", num_envs)
         self.settings = changed(task_settings(task), changes)
-        self.num_envs, self._copy, self._mode = num_envs, copy, mode
+        self.num_envs, self._mode = num_envs, mode
         self.metadata = {"autoreset_mode": mode, "render_modes": [], "render_fps": RATE}
         self.single_action_space = action_space()
         self.single_observation_space = observation_space(self.settings)
@@ -104,7 +101,7 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         self._batch.reset(seeds=None if seed is None else self._seeds(seed), mask=mask)
         self._seeded, self._begun[chosen], self._ended[chosen] = True, True, False
         every = range(self.num_envs)
-        return self._given(self._batch.observation), {"drawn": self._drawn(every)}
+        return self._batch.observation.copy(), {"drawn": self._drawn(every)}
 
     def _drawn(self, indices: Iterable[int]) -> dict[str, NDArray[np.float64]]:
         """Returns the drawn parameters of environments by name, 0 for the others."""
@@ -137,22 +134,22 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         batch.action[...] = checked(actions, (self.num_envs, JOINTS))
         batch.step()
         return (
-            self._given(batch.observation),
-            self._given(batch.reward),
-            self._given(batch.terminated),
-            self._given(batch.truncated),
+            batch.observation.copy(),
+            batch.reward.copy(),
+            batch.terminated.copy(),
+            batch.truncated.copy(),
             self._info(),
         )
 
     def _info(self) -> dict[str, Any]:
         batch = self._batch
-        own: dict[str, Any] = {"terms": dict(zip(TERMS, self._given(batch.term).T, strict=True))}
-        info: dict[str, Any] = {"refused": self._given(batch.refused)}
+        own: dict[str, Any] = {"terms": dict(zip(TERMS, batch.term.copy().T, strict=True))}
+        info: dict[str, Any] = {"refused": batch.refused.copy()}
         ended = batch.terminated | batch.truncated
         if ended.any():
             own |= self._ends(ended)
             if self._mode is AutoresetMode.SAME_STEP:
-                info |= {"final_obs": self._given(batch.last), "_final_obs": ended}
+                info |= {"final_obs": batch.last.copy(), "_final_obs": ended}
                 info |= {"final_info": own, "_final_info": ended}
         began = {
             AutoresetMode.NEXT_STEP: self._ended,
@@ -175,9 +172,6 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
                 message[index] = self._batch.message(int(index))
             found |= {"message": message, "_message": failed}
         return found
-
-    def _given(self, array: NDArray[Any]) -> NDArray[Any]:
-        return array.copy() if self._copy else array
 
     def close_extras(self, **_: Any) -> None:
         """Ends the threads and frees the plants."""

@@ -203,14 +203,3 @@ def test_drawn_parameters_keep_their_ranges_and_differ_between_episodes() -> Non
         second = [batch.drawn(index)["friction.mu"] for index in range(20)]
     assert all(0.4 <= mu <= 0.9 for mu in first + second)
     assert len({*first, *second}) == 40
-
-
-def test_actions_of_zero_added_to_a_controller_walk_forward() -> None:
-    settings = EnvSettings(
-        base="kinematic", command_vx=(0.1, 0.1), command_vy=(0.0, 0.0), command_yaw_rate=(0.0, 0.0)
-    )
-    with Batch(settings, 1, threads=1) as batch:
-        batch.reset(seeds=[1])
-        for _ in range(150):
-            batch.step()
-        assert batch.values(0)["torso.position[1]"] > 0.15

@@ -19,6 +19,7 @@ from hexapod_cosim.models.ground.faces import ground_normal
 from hexapod_cosim.models.kinematics import body_states, rotation_matrix
 from hexapod_cosim.models.mjcf import robot_to_mjcf, tibia_mobility
 from hexapod_cosim.models.records import JOINT_NAMES, Array
+from hexapod_cosim.models.servos.motor import back_emf_damping
 from hexapod_cosim.models.statics import settled
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
@@ -195,7 +196,9 @@ def test_mujocos_joints_and_servos_are_the_robots(robot: Robot) -> None:
     assert set(model.dof_armature[6:]) == {robot.servo.rotor_inertia}
     assert set(model.dof_frictionloss[6:]) == {robot.servo.coulomb_friction}
     assert set(model.actuator_gainprm[:, 0]) == {robot.servo.kp}
-    assert set(model.actuator_biasprm[:, 2]) == {-robot.servo.kd}
+    motor = robot.servo.drive == "motor"  # whose back-EMF damps, too
+    damping = robot.servo.kd + (back_emf_damping(robot.servo) if motor else 0.0)
+    assert set(model.actuator_biasprm[:, 2]) == {-damping}
     assert set(model.actuator_forcerange[:, 1]) == {robot.servo.torque_max}
     assert tuple(model.opt.gravity) == robot.gravity
 

@@ -151,7 +151,7 @@ class NativeController:
 
     def restore(self, state: bytes) -> None:
         """Restores a state returned by save()."""
-        self._checked(self._core.hx_controller_set_state(self._handle, state, len(state)))
+        self._checked(self._core.hx_controller_set_state(self._handle, state))
 
 
 def commands(out: Any) -> np.ndarray:

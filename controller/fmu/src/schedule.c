@@ -8,17 +8,15 @@
 #include "hexapod/message.h"
 #include "state.h"
 
-/* A saved state: a header that identifies it, then the controller's definition, models and state.
- */
+/* A saved state. The FMI layer's header identifies it; the checksum protects the indices of models
+ * and gaits in it from bytes that another program has written. */
 typedef struct {
-  uint64_t magic, version, size, checksum;
+  uint64_t checksum; /* of what follows */
   hxControllerDefinition definition;
   hxControllerModel model[2];
   hxControllerState state;
 } hxSaved;
 
-static const uint64_t magic = 0x72746e6f43507868u; /* "hxPContr" */
-static const uint64_t saved_version = 9;
 /* 1, of a period: a tick that is later than the present time by less than this is due */
 static const double clock_tolerance = 0.01;
 
@@ -237,9 +235,6 @@ size_t hx_controller_state_size(void) { return sizeof(hxSaved); }
 void hx_controller_get_state(const hxController *controller, void *bytes) {
   hxSaved saved;
   memset(&saved, 0, sizeof saved);
-  saved.magic = magic;
-  saved.version = saved_version;
-  saved.size = sizeof saved;
   memcpy(&saved.definition, &controller->definition, sizeof saved.definition);
   memcpy(saved.model, controller->model, sizeof saved.model);
   memcpy(&saved.state, state_of(controller), sizeof saved.state);
@@ -247,19 +242,9 @@ void hx_controller_get_state(const hxController *controller, void *bytes) {
   memcpy(bytes, &saved, sizeof saved);
 }
 
-hxStatus hx_controller_set_state(hxController *controller, const void *bytes, size_t size) {
+hxStatus hx_controller_set_state(hxController *controller, const void *bytes) {
   hxSaved saved;
-  if (size != sizeof saved) {
-    hx_print(controller->message, HX_MESSAGE_SIZE,
-             "saved state: got %zu bytes, expected %zu; save it again with this version", size,
-             sizeof saved);
-    return HX_BAD_STATE;
-  }
   memcpy(&saved, bytes, sizeof saved);
-  if (saved.magic != magic || saved.version != saved_version || saved.size != sizeof saved)
-    return refuse(
-        controller, HX_BAD_STATE,
-        "saved state: got one of another version, expected one of this version; save it again");
   if (saved.checksum != checksum(&saved))
     return refuse(
         controller, HX_BAD_STATE,

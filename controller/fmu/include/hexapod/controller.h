@@ -73,11 +73,11 @@ HX_API double hx_controller_time(const hxController *controller);
 HX_API const char *
 hx_controller_message(const hxController *controller); /* of the last failure, "" before any */
 
-/* Save and restore the controller as bytes. hx_controller_set_state checks them; HX_BAD_STATE: the
- * controller is unchanged. */
+/* Save and restore the controller as bytes. HX_BAD_STATE: they are damaged, and the controller
+ * is unchanged. */
 HX_API size_t hx_controller_state_size(void);
 HX_API void hx_controller_get_state(const hxController *controller, void *bytes);
-HX_API hxStatus hx_controller_set_state(hxController *controller, const void *bytes, size_t size);
+HX_API hxStatus hx_controller_set_state(hxController *controller, const void *bytes);
 
 #ifdef __cplusplus
 }

@@ -28,58 +28,28 @@ static void keep_message(fmi2ComponentEnvironment owner, fmi2String name, fmi2St
   va_end(arguments);
 }
 
-static fmi2Component instantiate(hxEnvironment *environment, const hxEnvFmu *fmu, int which) {
-  const fmi2CallbackFunctions callbacks = {keep_message, calloc, free, NULL, environment};
-  memcpy(&environment->callbacks[which], &callbacks, sizeof callbacks);
-  return fmu->instantiate(which == 0 ? "plant" : "controller", fmi2CoSimulation, fmu->guid,
-                          fmu->resources, &environment->callbacks[which], fmi2False, fmi2False);
-}
-
-/* Prepares the macro-steps of an environment, whose instances are not made yet. */
-static void prepare(hxEnvironment *environment, const hxEnvSettings *settings) {
-  const hxStepBlock output = {settings->plant_output, HX_ENV_VALUES, 0};
-  const hxStepBlock input = {settings->plant_input, HX_ENV_INPUTS, HX_ENV_VALUES};
-  const hxStepBlock commands = {settings->controller_output, HX_ENV_COMMANDS, HX_ENV_VALUES};
-  for (size_t i = 0; i < HX_ENV_SENSED; ++i) /* angles, then forces and quaternion, which adjoin */
-    environment->sensed[i] =
-        i < HX_ENV_JOINTS ? HX_ENV_ANGLE + i : HX_ENV_FORCE + i - HX_ENV_JOINTS;
-  environment->stepper = (hxStepper){
-      .plant = settings->plant.step,
-      .controller = settings->controller.step,
-      .plant_output = output,
-      .plant_input = input,
-      .controller_output = commands,
-      .controller_input = settings->controller_input,
-      .sensed = environment->sensed,
-      .command_count = HX_ENV_BODY,
-      .sensed_count = HX_ENV_SENSED,
-      .given = environment->given,
-      .value = environment->value,
-      .h = settings->h,
-  };
-}
-
 int hx_environment_open(hxEnvironment *environment, const hxEnvSettings *settings, double *drawn) {
+  const fmi2CallbackFunctions callbacks = {keep_message, calloc, free, NULL, environment};
+  const hxEnvFmu *plant = &settings->plant;
+  memcpy(&environment->callbacks, &callbacks, sizeof callbacks);
   environment->settings = settings;
   environment->drawn = drawn;
   environment->ended = 1;
-  prepare(environment, settings);
-  hxStepper *stepper = &environment->stepper;
-  stepper->plant.instance = instantiate(environment, &settings->plant, 0);
-  if (!stepper->plant.instance) return 0;
-  if (!settings->controller.instantiate) return 1;
-  stepper->controller.instance = instantiate(environment, &settings->controller, 1);
-  if (stepper->controller.instance) return 1;
-  hx_environment_close(environment);
-  return 0;
+  environment->stepper = (hxStepper){
+      .plant = plant->step,
+      .plant_output = {settings->plant_output, HX_ENV_VALUES, 0},
+      .plant_input = {settings->plant_input, HX_ENV_INPUTS, HX_ENV_VALUES},
+      .value = environment->value,
+      .h = settings->h,
+  };
+  environment->stepper.plant.instance =
+      plant->instantiate("plant", fmi2CoSimulation, plant->guid, plant->resources,
+                         &environment->callbacks, fmi2False, fmi2False);
+  return environment->stepper.plant.instance != NULL;
 }
 
 void hx_environment_close(hxEnvironment *environment) {
-  const hxEnvSettings *settings = environment->settings;
-  hxStepFmu *plant = &environment->stepper.plant, *controller = &environment->stepper.controller;
-  if (plant->instance) settings->plant.free_instance(plant->instance);
-  if (controller->instance) settings->controller.free_instance(controller->instance);
-  plant->instance = controller->instance = NULL;
+  environment->settings->plant.free_instance(environment->stepper.plant.instance);
 }
 
 hxEnvWork hx_environment_work(const hxEnvSettings *settings) {
@@ -143,32 +113,24 @@ static void draw_parameters(hxEnvironment *environment) {
   }
 }
 
-/* Draws the command of the present step if one begins with it. */
 static void draw_command(hxEnvironment *environment) {
   const hxEnvSettings *settings = environment->settings;
-  const size_t interval = settings->command_interval;
-  const size_t number = interval ? environment->step / interval : 0;
-  if (environment->step != number * interval) return;
   for (size_t i = 0; i < 3; ++i) {
     const double low = settings->command_low[i], range = settings->command_high[i] - low;
-    environment->body[i] = low + uniform(environment, HX_STREAM_COMMAND, 3 * number + i) * range;
+    environment->command[i] = low + uniform(environment, HX_STREAM_COMMAND, i) * range;
   }
 }
 
-/* Resets and initialises the FMUs; returns 0 when one refuses. */
+/* Resets and initialises the plant; returns 0 when it refuses. */
 static int restart(hxEnvironment *environment) {
   const hxEnvSettings *settings = environment->settings;
   const hxEnvDraws *draws = &settings->draws;
   const hxStepFmu *plant = &environment->stepper.plant;
-  void *controller = environment->stepper.controller.instance;
   if (!accept(settings->plant.reset(plant->instance))) return 0;
   if (draws->count && !accept(plant->set_reals(plant->instance, draws->reference, draws->count,
                                                environment->drawn)))
     return 0;
   if (!start(&settings->plant, plant->instance)) return 0;
-  if (controller &&
-      !(accept(settings->controller.reset(controller)) && start(&settings->controller, controller)))
-    return 0;
   return hx_read_plant(&environment->stepper);
 }
 
@@ -237,27 +199,19 @@ static void push(hxEnvironment *environment) {
   force[1] = size * sin(angle);
 }
 
-/* Adds the action to the joint commands of the controller, or to the stance. */
+/* Commands the angles of the stance and the action. */
 static void act(void *owner) {
   hxEnvironment *environment = owner;
   const hxEnvSettings *settings = environment->settings;
   double *angle = environment->value + HX_ENV_VALUES;
-  if (!environment->stepper.controller.instance)
-    memcpy(angle, settings->stance, sizeof settings->stance);
   for (int i = 0; i < HX_ENV_JOINTS; ++i)
-    angle[i] += settings->action_scale[i] * environment->action[i];
-}
-
-static int substep(hxEnvironment *environment, size_t number) {
-  const hxEnvSettings *settings = environment->settings;
-  const double t = (double)(environment->step * settings->substeps + number) * settings->h;
-  return hx_macro_step(&environment->stepper, t, environment->body, act, NULL, environment);
+    angle[i] = settings->stance[i] + settings->action_scale[i] * environment->action[i];
 }
 
 static int advance(hxEnvironment *environment) {
+  const double t = (double)environment->step * environment->settings->h;
   push(environment);
-  for (size_t number = 0; number < environment->settings->substeps; ++number)
-    if (!substep(environment, number)) return 0;
+  if (!hx_macro_step(&environment->stepper, t, NULL, act, NULL, environment)) return 0;
   ++environment->step;
   return 1;
 }
@@ -288,28 +242,22 @@ double hx_environment_step(hxEnvironment *environment, const float action[HX_ENV
   environment->ended = environment->reason != HX_END_NONE;
   const hxEnvMotion motion = {
       .view = view,
-      .command = environment->body,
+      .command = environment->command,
       .torque = environment->value + HX_ENV_TORQUE,
       .speed = environment->value + HX_ENV_SPEED,
       .change = change,
       .slip = slip_distance(environment) - before,
-      .time = (double)settings->substeps * settings->h,
+      .time = settings->h,
       .fell = environment->ended && environment->reason != HX_END_TIME,
   };
-  const double reward = hx_reward(settings, &motion, term);
-  draw_command(environment);
-  return reward;
+  return hx_reward(settings, &motion, term);
 }
 
 /* ----------------------------------------------------------------------------------------------
  * observations */
 
 static const size_t block_size[HX_ENV_BLOCKS] = {
-    3, 3, 3, 3, HX_ENV_JOINTS, HX_ENV_JOINTS, HX_ENV_JOINTS, 2, 0};
-
-static size_t size_of(const hxEnvSettings *settings, int block) {
-  return block == HX_SEE_HEIGHTS ? settings->ground.points : block_size[block];
-}
+    3, 3, 3, 3, HX_ENV_JOINTS, HX_ENV_JOINTS, HX_ENV_JOINTS, 2};
 
 /* Returns whether the axes of a block have scales of their own. */
 static int is_vector(int block) { return block_size[block] == 3; }
@@ -323,7 +271,7 @@ static int sees(const hxEnvSettings *settings, int block) {
 size_t hx_environments_observed(const hxEnvSettings *settings) {
   size_t size = 0;
   for (int block = 0; block < HX_ENV_BLOCKS; ++block)
-    if (sees(settings, block)) size += size_of(settings, block);
+    if (sees(settings, block)) size += block_size[block];
   return size;
 }
 
@@ -333,63 +281,17 @@ static double limited(double value, double limit) { return fmin(fmax(value, -lim
 /* Writes a block and returns the place behind it. */
 static float *show(const hxEnvSettings *settings, int block, const double *value, float *to) {
   const double *scale = settings->observed[block];
-  const size_t size = size_of(settings, block);
+  const size_t size = block_size[block];
   if (!sees(settings, block)) return to;
   for (size_t i = 0; i < size; ++i)
     to[i] = (float)limited(value[i] * scale[is_vector(block) ? i : 0], HX_ENV_LARGEST);
   return to + size;
 }
 
-/* Returns the node below a coordinate in units of the spacing, and the share of the way to the next
- * node. Beyond the first and the last node it stays there. */
-static size_t node_below(double coordinate, size_t nodes, double *share) {
-  const double last = (double)(nodes - 1), inside = fmin(fmax(coordinate, 0.0), last);
-  const double node = fmin(floor(inside), last - 1.0);
-  *share = inside - node;
-  return (size_t)node;
-}
-
-/* Returns the height of a ground [m] at a place in the world. */
-static double height_at(const hxEnvGround *ground, const float *height, double x, double y) {
-  double u, v;
-  const size_t column = node_below((x - ground->x0) / ground->spacing, ground->columns, &u);
-  const size_t row = node_below((y - ground->y0) / ground->spacing, ground->rows, &v);
-  const float *low = height + row * ground->columns + column, *high = low + ground->columns;
-  return (1.0 - v) * ((1.0 - u) * (double)low[0] + u * (double)low[1]) +
-         v * ((1.0 - u) * (double)high[0] + u * (double)high[1]);
-}
-
-static const float *present_ground(const hxEnvironment *environment) {
-  const hxEnvSettings *settings = environment->settings;
-  const hxEnvGround *ground = &settings->ground;
-  const size_t number =
-      ground->draw < settings->draws.count ? (size_t)environment->drawn[ground->draw] - 1 : 0;
-  return ground->height + number * ground->rows * ground->columns;
-}
-
-/* Writes the heights of the scanned places. */
-static void scan(const hxEnvironment *environment, float *to) {
-  const hxEnvSettings *settings = environment->settings;
-  const hxEnvGround *ground = &settings->ground;
-  const float *height = present_ground(environment);
-  const double *r = environment->value + HX_ENV_POSITION;
-  const double *p = environment->value + HX_ENV_QUATERNION;
-  /* the torso's x axis, projected onto the horizontal plane */
-  const double x = 1.0 - 2.0 * (p[2] * p[2] + p[3] * p[3]), y = 2.0 * (p[1] * p[2] + p[0] * p[3]);
-  const double length = sqrt(x * x + y * y);
-  const double c = length > 0.0 ? x / length : 1.0, s = length > 0.0 ? y / length : 0.0;
-  for (size_t i = 0; i < ground->points; ++i) {
-    const double a = ground->place[2 * i], b = ground->place[2 * i + 1];
-    const double below = height_at(ground, height, r[0] + c * a - s * b, r[1] + s * a + c * b);
-    const double over = limited(r[2] - below - ground->clearance, 1.0);
-    to[i] = (float)limited(over * settings->observed[HX_SEE_HEIGHTS][0], HX_ENV_LARGEST);
-  }
-}
-
 void hx_environment_observe(const hxEnvironment *environment, float *observation) {
   const hxEnvSettings *settings = environment->settings;
   const hxEnvView view = view_of(environment);
-  const double time = (double)(environment->step * settings->substeps) * settings->h;
+  const double time = (double)environment->step * settings->h;
   const double turns = settings->clock * time, phase = two_pi * (turns - floor(turns));
   const double clock[2] = {sin(phase), cos(phase)};
   double angle[HX_ENV_JOINTS];
@@ -398,10 +300,9 @@ void hx_environment_observe(const hxEnvironment *environment, float *observation
   observation = show(settings, HX_SEE_VELOCITY, view.velocity, observation);
   observation = show(settings, HX_SEE_ROTATION, view.rotation, observation);
   observation = show(settings, HX_SEE_GRAVITY, view.gravity, observation);
-  observation = show(settings, HX_SEE_COMMAND, environment->body, observation);
+  observation = show(settings, HX_SEE_COMMAND, environment->command, observation);
   observation = show(settings, HX_SEE_ANGLE, angle, observation);
   observation = show(settings, HX_SEE_SPEED, environment->value + HX_ENV_SPEED, observation);
   observation = show(settings, HX_SEE_ACTION, environment->action, observation);
-  observation = show(settings, HX_SEE_CLOCK, clock, observation);
-  if (sees(settings, HX_SEE_HEIGHTS)) scan(environment, observation);
+  show(settings, HX_SEE_CLOCK, clock, observation);
 }

@@ -25,22 +25,20 @@ typedef struct hxEnvMotion {
 
 typedef struct hxEnvironment {
   const hxEnvSettings *settings;
-  hxStepper stepper; /* plant and controller */
+  hxStepper stepper; /* of the plant */
   uint64_t seed, episode;
   size_t step;                                 /* 1  steps of this episode */
   int ended;                                   /* 1: the episode is over, or none was started */
   int reason;                                  /* hxEnvReason */
   double value[HX_ENV_VALUES + HX_ENV_INPUTS]; /* outputs of the plant, then its inputs */
-  size_t sensed[HX_ENV_SENSED]; /* 1    indices of the controller's measurements in `value` */
-  double given[HX_ENV_BODY + HX_ENV_SENSED]; /* inputs of the controller */
-  double action[HX_ENV_JOINTS];              /* 1    last one, limited */
-  double body[HX_ENV_BODY];                  /*      command; the first three are drawn */
-  double *drawn;                             /*      [draws.count] values of the parameters */
-  fmi2CallbackFunctions callbacks[2];        /* of plant and controller */
+  double action[HX_ENV_JOINTS];                /* 1    last one, limited */
+  double command[3];                           /* m/s, m/s, rad/s  forward, to the left, yaw rate */
+  double *drawn;                               /*      [draws.count] values of the parameters */
+  fmi2CallbackFunctions callbacks;             /* of the plant */
   char message[HX_MESSAGE_SIZE];
 } hxEnvironment;
 
-/* Instantiates the FMUs. Returns 0 when one refuses, and then frees the others. */
+/* Instantiates the plant. Returns 0 when it refuses. */
 int hx_environment_open(hxEnvironment *environment, const hxEnvSettings *settings, double *drawn);
 void hx_environment_close(hxEnvironment *environment);
 

@@ -1,4 +1,4 @@
-/* policy.c - the public functions of a policy: ticks at their times, saved states, refusals. */
+/* policy.c - a policy: its action a = V tanh(W x + w) + v, ticks, saved states, refusals. */
 #include "hexapod/policy.h"
 
 #include <float.h>
@@ -8,7 +8,6 @@
 
 #include "hexapod/message.h"
 #include "hexapod/range_check.h"
-#include "perceptron.h"
 
 /* Consists of doubles and one integer of 64 bits, without padding. */
 typedef struct hxPolicyState {
@@ -32,6 +31,7 @@ typedef struct {
 
 /* 1, of a period: a tick that is later than the present time by less than this is due */
 static const double clock_tolerance = 0.01;
+static const double two_pi = 6.283185307179586;
 
 static hxStatus refuse_policy(hxPolicy *policy, hxStatus status, const char *text) {
   hx_print(policy->message, HX_MESSAGE_SIZE, "%s", text);
@@ -72,6 +72,62 @@ static hxStatus check_input(const hxPolicyInput *input, char *message) {
 }
 
 /* ----------------------------------------------------------------------------------------------
+ * action */
+
+/* Computes R^T u, with the rotation R of the quaternion [w x y z], torso to world. */
+static void to_torso_axes(const double p[4], const double u[3], double v[3]) {
+  const double w = p[0], *q = p + 1;
+  const double c[3] = {u[1] * q[2] - u[2] * q[1], u[2] * q[0] - u[0] * q[2],
+                       u[0] * q[1] - u[1] * q[0]}; /* u x q */
+  const double d[3] = {c[1] * q[2] - c[2] * q[1], c[2] * q[0] - c[0] * q[2],
+                       c[0] * q[1] - c[1] * q[0]}; /* (u x q) x q */
+  for (int i = 0; i < 3; ++i) v[i] = u[i] + 2.0 * (w * c[i] + d[i]);
+}
+
+/* Computes the observation. */
+static void observe(const hxPolicyDefinition *definition, const hxPolicyInput *input, double time,
+                    double x[HX_POLICY_SEEN]) {
+  static const double down[3] = {0.0, 0.0, -1.0};
+  const double turns = definition->clock * time, phase = two_pi * (turns - floor(turns));
+  double *to = x + 9;
+  to_torso_axes(input->quaternion, input->rotation, x);
+  to_torso_axes(input->quaternion, down, x + 3);
+  for (int i = 0; i < 3; ++i) x[i] *= 0.25;
+  x[6] = 10.0 * input->command.vx;
+  x[7] = 10.0 * input->command.vy;
+  x[8] = input->command.yaw_rate;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      *to++ = input->angle[leg][joint] - definition->stance[leg][joint];
+  to[0] = sin(phase);
+  to[1] = cos(phase);
+}
+
+static double product(const double *a, const double *b, int n) {
+  double sum = 0.0;
+  for (int i = 0; i < n; ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+/* Computes the action for an input at a time since the first tick [s]. */
+static void act(const hxPolicyDefinition *definition, const hxPolicyInput *input, double time,
+                hxPolicyOutput *output) {
+  double x[HX_POLICY_SEEN], hidden[HX_POLICY_UNITS];
+  observe(definition, input, time, x);
+  for (int k = 0; k < HX_POLICY_UNITS; ++k)
+    hidden[k] =
+        tanh(product(definition->hidden_weight[k], x, HX_POLICY_SEEN) + definition->hidden_bias[k]);
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const double a = product(definition->action_weight[leg][joint], hidden, HX_POLICY_UNITS) +
+                       definition->action_bias[leg][joint];
+      output->action[leg][joint] = fmin(fmax(a, -1.0), 1.0);
+      output->angle_ref[leg][joint] =
+          definition->stance[leg][joint] + definition->action_scale * output->action[leg][joint];
+    }
+}
+
+/* ----------------------------------------------------------------------------------------------
  * ticks */
 
 hxStatus hx_policy_reset(hxPolicy *policy, const hxPolicyDefinition *definition, double t) {
@@ -101,7 +157,7 @@ void hx_policy_output(const hxPolicy *policy, const hxPolicyInput *input, hxPoli
   if (state->start + tick - state->time > tolerance)
     *output = state->output;
   else
-    hx_policy_act(&policy->definition, input, tick, output);
+    act(&policy->definition, input, tick, output);
 }
 
 /* Computes the input some time after it was set, with its rate of change. */
@@ -129,7 +185,7 @@ hxStatus hx_policy_step(hxPolicy *policy, const hxPolicyInput *input, const hxPo
   while (t_end - (state->start + next_tick(policy)) > tolerance) {
     const double tick = next_tick(policy);
     if (rate) ramp_input(input, rate, fmax(state->start + tick - begin, 0.0), &now);
-    hx_policy_act(&policy->definition, &now, tick, &state->output);
+    act(&policy->definition, &now, tick, &state->output);
     ++state->tick;
   }
   state->time = t_end;

@@ -1,10 +1,9 @@
 /* environments.h - many robots stepped together, for reinforcement learning: one array of actions
  * in, arrays of observations, rewards and flags out.
  *
- * Each environment is an instance of a plant FMU and, if its actions are corrections of a
- * controller's commands, one of a controller FMU. Both are driven through functions of FMI 2.0
- * only. Environments share nothing: what one does depends on its seed, its episode and its actions
- * alone, so that results are the same bits for any number of threads, any batch and any order.
+ * Each environment is an instance of a plant FMU, driven through functions of FMI 2.0 only.
+ * Environments share nothing: what one does depends on its seed, its episode and its actions alone,
+ * so that results are the same bits for any number of threads, any batch and any order.
  *
  * An FMU whose binary has the functions of shared_work.h uses the work space of the thread that
  * steps it, from just before to just after the step. The memory belongs to the library: that of the
@@ -51,9 +50,6 @@ typedef enum hxEnvPlace {
 /* Inputs of the plant in the order in which they are written. */
 enum { HX_ENV_COMMANDS = 3 * HX_ENV_JOINTS, HX_ENV_INPUTS = HX_ENV_COMMANDS + 3 };
 
-/* Inputs of a controller: six of the body command, then these. */
-enum { HX_ENV_BODY = 6, HX_ENV_SENSED = HX_ENV_JOINTS + 3 * HX_ENV_FEET + 4 };
-
 /* Largest size of a value in an observation: larger ones are limited to it. */
 #define HX_ENV_LARGEST 100.0
 
@@ -67,8 +63,6 @@ typedef enum hxEnvBlock {
   HX_SEE_SPEED,    /* 18  rad/s  joint speeds */
   HX_SEE_ACTION,   /* 18  1      the last action, as it was applied */
   HX_SEE_CLOCK,    /* 2   1      sine and cosine of the clock's phase */
-  HX_SEE_HEIGHTS, /*     m      height of the torso over the scanned places of the ground, less that
-                   *            of the stance, at most 1 m up and down: ground.points values */
   HX_ENV_BLOCKS
 } hxEnvBlock;
 
@@ -108,7 +102,7 @@ typedef enum hxAutoreset {
   HX_AUTORESET_DISABLED   /* the caller resets; until then steps change nothing */
 } hxAutoreset;
 
-/* An FMU and its functions. instantiate = NULL: there is none. */
+/* An FMU and its functions. */
 typedef struct hxEnvFmu {
   fmi2InstantiateTYPE *instantiate;
   fmi2FreeInstanceTYPE *free_instance;
@@ -128,37 +122,16 @@ typedef struct hxEnvDraws {
   const fmi2ValueReference *reference; /*       [count] */
   const double *low, *high;            /*       [count] range, both ends possible */
   const int32_t *whole;                /* 1     [count] whole numbers only */
-  const int32_t *group;                /* 1     [count] number of the random number */
   size_t count;
 } hxEnvDraws;
 
-/* Heights of the grounds on which an environment may stand, and the places that are observed. The
- * heights are sampled on a square grid, bilinear between its nodes; outside the grid those of its
- * border go on. */
-typedef struct hxEnvGround {
-  const float *height;         /* m    [count][rows][columns]; rows along y, columns along x */
-  const double *place;         /* m    [points][2] forward and to the left of the torso's centre of
-                                *      mass, in horizontal axes that turn with the torso */
-  size_t count, rows, columns; /* 1    at least 1, 2, 2 where points is not 0 */
-  size_t points;               /* 1    scanned places */
-  size_t draw;                 /* 1    index of the draw whose value is the ground's number, from 1;
-                                *      draws.count: always the first ground */
-  double x0, y0;               /* m    of the first node */
-  double spacing;              /* m    of the nodes */
-  double clearance;            /* m    height of the torso over level ground in the stance */
-} hxEnvGround;
-
 /* Equal for all environments of a batch. Arrays must live as long as the batch. */
 typedef struct hxEnvSettings {
-  hxEnvFmu plant, controller;
-  const fmi2ValueReference *plant_output;      /* [HX_ENV_VALUES] */
-  const fmi2ValueReference *plant_input;       /* [HX_ENV_INPUTS] angles, speeds, torques, push */
-  const fmi2ValueReference *controller_input;  /* [HX_ENV_BODY + HX_ENV_SENSED] */
-  const fmi2ValueReference *controller_output; /* [HX_ENV_COMMANDS] */
+  hxEnvFmu plant;
+  const fmi2ValueReference *plant_output; /* [HX_ENV_VALUES] */
+  const fmi2ValueReference *plant_input;  /* [HX_ENV_INPUTS] angles, speeds, torques, push */
   hxEnvDraws draws;
-  hxEnvGround ground;
-  double h;                           /* s    between two commands of a controller */
-  size_t substeps;                    /* 1    of h, in a step of an environment */
+  double h;                           /* s    of a step */
   size_t length;                      /* 1    steps of an episode */
   double stance[HX_ENV_JOINTS];       /* rad  commanded angles for the action 0 */
   double action_scale[HX_ENV_JOINTS]; /* rad  for the action 1, the largest */
@@ -166,13 +139,11 @@ typedef struct hxEnvSettings {
                                        *      otherwise the first */
   double clock;                       /* Hz */
   double command_low[3], command_high[3]; /* m/s, m/s, rad/s  ranges of the drawn commands */
-  size_t command_interval; /* 1    steps from one draw of the command to the next; 0: one draw for
-                            *      each episode */
-  size_t push_interval;    /* 1    steps from the start of a push to the next; 0: none */
-  size_t push_length;      /* 1    steps that a push lasts */
-  double push_force;       /* N    largest; horizontal, of uniform size and direction */
-  double upright;          /* 1    least cosine of the torso's lean */
-  double belly_force;      /* N    largest force of the ground on the torso */
+  size_t push_interval;        /* 1    steps from the start of a push to the next; 0: none */
+  size_t push_length;          /* 1    steps that a push lasts */
+  double push_force;           /* N    largest; horizontal, of uniform size and direction */
+  double upright;              /* 1    least cosine of the torso's lean */
+  double belly_force;          /* N    largest force of the ground on the torso */
   double weight[HX_ENV_TERMS]; /*      of the terms of the reward */
   double width[2];             /* m/s, rad/s  of the tracking terms: exp(-(e / width)^2) */
   int autoreset;               /* hxAutoreset */
@@ -194,7 +165,7 @@ typedef struct hxEnvironments hxEnvironments;
 
 /* Number of the layout of hxEnvSettings, hxEnvArrays, the structures in them and the lists of names
  * above. A change of their members, or of what a member means, increases it. */
-#define HX_ENVIRONMENTS_LAYOUT 3
+#define HX_ENVIRONMENTS_LAYOUT 4
 
 /* Layout and size of hxEnvSettings in this library, with which callers check their own. */
 HX_API int hx_environments_layout(void);
