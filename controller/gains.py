@@ -206,7 +206,8 @@ class LimitGains:
 class Requirements:
     """Requirements of a design. The defaults suit legs of 0.22 to 0.44 m; for others: size.py."""
 
-    phase_margin: Positive = 60.0  # deg    of the paper's control, at least
+    # deg    of the paper's control, at least; no loop with a crossing has 180
+    phase_margin: Annotated[float, Number("deg", above=0.0, below=180.0)] = 60.0
     gain_margin: NotNegative = 5.0  # dB    the same
     static_margin: NotNegative = 3.0  # dB    the same, of feet that push against each other
     delay_periods: NotNegative = 1.0  # 1    computing delay in controller periods

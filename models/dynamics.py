@@ -36,8 +36,7 @@ from hexapod_cosim.models.kinematics import (
     skew,
     split,
 )
-from hexapod_cosim.models.records import Robot
-from hexapod_cosim.models.servos.gear import Rotors, gear_torque, is_elastic, spin_inertia
+from hexapod_cosim.models.records import Robot, Servo
 from hexapod_cosim.models.servos.motor import FULL, Power, friction_torque, has_measured_friction
 
 MULTIPLIERS = 5
@@ -159,7 +158,7 @@ def world_inertias(robot: Robot, body: Array) -> Array:
 
 
 def mass_matrix(robot: Robot, body: Array, joints: Constraints | None = None) -> Array:
-    """Returns M = diag(m 1, J) + J_r G^T G (114, 114), with rigid gears.
+    """Returns M = diag(m 1, J) + J_r G^T G (114, 114).
 
     The inertia J_r of the geared rotors acts on the joint speeds; with a gear ratio n it also
     couples them to the bodies that carry the rotors, J_r/n (G^T P + P^T G) (eq. 57). joints:
@@ -192,18 +191,18 @@ def link_matrix(robot: Robot, body: Array, joints: Constraints | None = None) ->
     return mass_matrix(replace(robot, servo=replace(robot.servo, rotor_inertia=0.0)), body, joints)
 
 
-def rotor_speeds(robot: Robot, body: Array, rotors: Rotors | None) -> Array:
-    """Returns the speeds (6, 3) of the rotors, seen at the joints [rad/s]; None: rigid gears."""
-    return joint_speeds(robot, body) if rotors is None else rotors.speed
+def spin_inertia(servo: Servo) -> float:
+    """Returns the inertia of a rotor times its gear ratio, J_r/n [kg m2] (eq. 57); 0: left out."""
+    return servo.rotor_inertia / servo.gear_ratio if servo.gear_ratio != 0.0 else 0.0
 
 
-def rotor_moments(robot: Robot, body: Array, rotors: Rotors | None) -> Array:
+def rotor_moments(robot: Robot, body: Array) -> Array:
     """Returns the moments (19, 3) of the rotors on the bodies that carry them, -h w_i x s [N m].
 
     h is the angular momentum J_r/n times the speed of the rotor, about the joint's axis (eq. 57).
     """
     moments = np.zeros((BODIES, 3))
-    spin = spin_inertia(robot.servo) * rotor_speeds(robot, body, rotors).ravel()
+    spin = spin_inertia(robot.servo) * joint_speeds(robot, body).ravel()
     for joint, h in zip(joint_models(robot), spin, strict=True):
         s = rotation_matrix(body[joint.parent, 3:7]) @ joint.s_i
         moments[joint.parent] -= h * cross(body[joint.parent, 10:13], s)
@@ -216,14 +215,13 @@ def applied_forces(
     command: Command,
     damping: Array | Contacts,
     bristle: Array | None = None,
-    rotors: Rotors | None = None,
 ) -> Array:
     """Returns the forces g (19, 6) of eq. 1 without the joints' torques [N, N m].
 
     damping: of the feet on the ground below them (6,) [s/m], nan for open ones; or the state of all
     contacts, which has those of walls, materials and soil, too. With an array, parts of the body
     in the ground and legs that overlap touch at impact speed 0. bristle: deflections (6, 3) [m], 0
-    by default. rotors: of elastic gears; None: rigid.
+    by default.
     """
     if not isinstance(damping, Contacts):
         closed = contacts_of(robot, damping, standing_body_damping(robot, body))
@@ -233,7 +231,7 @@ def applied_forces(
     J, w = world_inertias(robot, body), body[:, 10:13]
     g[:, 3:6] = -np.cross(w, np.einsum("kij,kj->ki", J, w))
     if spin_inertia(robot.servo) != 0.0:
-        g[:, 3:6] += rotor_moments(robot, body, rotors)
+        g[:, 3:6] += rotor_moments(robot, body)
     g[0] += np.concatenate([command.push_force, command.push_torque])
     return g + contact_wrenches(robot, body, damping, bristle)
 
@@ -243,17 +241,15 @@ def joint_torques(
     body: Array,
     command: Command,
     external: Array | None = None,
-    rotors: Rotors | None = None,
 ) -> tuple[Array, Array]:
-    """Returns motor torque (6, 3) and friction (6, 3) on the child [N m]; with elastic gears on the
-    rotors, whose state is given and whose speed is the motor's.
+    """Returns motor torque (6, 3) and friction (6, 3) on the child [N m].
 
     The motor torque is 0 in kinematic mode, where it is a multiplier; measured friction is then
     that of a motor which balances the external torque. external: (6, 3) as of
     `external_torques`, for gears whose friction depends on the load; None: 0.
     """
     servo = robot.servo
-    angle, speed = joint_angles(robot, body), rotor_speeds(robot, body, rotors)
+    angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
     load = np.zeros_like(angle) if external is None else external
     measured = has_measured_friction(servo)
     if servo.mode == "kinematic":
@@ -362,13 +358,6 @@ class Accelerations:
     multipliers: Array  # (18, 5)  lambda
     drive_torque: Array  # (6, 3)  motor on child [N m]; in kinematic mode the drive's multiplier
     gear_torque: Array  # (6, 3)  gear on child [N m]
-    rotor: Array | None = None  # (6, 3)  accelerations of rotors behind elastic gears [rad/s2]
-
-
-def link_torques(robot: Robot, body: Array, rotors: Rotors) -> Array:
-    """Returns the torques (6, 3) of elastic gears on the links [N m]."""
-    rate = rotors.speed - joint_speeds(robot, body)
-    return gear_torque(robot.servo, rotors.deflection, rate)
 
 
 def accelerations(
@@ -377,39 +366,23 @@ def accelerations(
     command: Command,
     damping: Array | Contacts,
     bristle: Array | None = None,
-    rotors: Rotors | None = None,
 ) -> Accelerations:
     """Solves eq. 1 for bodies (19, 13), whose joints may have drifted.
 
     damping and bristle are those of `applied_forces`. In kinematic mode the multiplier of a joint's
-    additional row is minus the motor's torque. rotors: those of elastic gears, whose accelerations
-    are then part of the solution; None: rigid gears.
+    additional row is minus the motor's torque.
     """
     joints = constraints(robot, body)
-    forces = applied_forces(robot, body, command, damping, bristle, rotors).ravel()
+    forces = applied_forces(robot, body, command, damping, bristle).ravel()
     load = gear_loads(robot, body, command, forces, joints)
-    motor, gear = joint_torques(robot, body, command, load, rotors)
+    motor, gear = joint_torques(robot, body, command, load)
     D, c = constraint_equations(robot, body, command, joints)
-    if not is_elastic(robot.servo):
-        g = forces + joints.G.T @ (motor + gear + stop_torques(robot, body)).ravel()
-        solution = solve_constrained(mass_matrix(robot, body, joints), g, D, c)
-        dv, multiplier, drive = np.split(solution, [6 * BODIES, 6 * BODIES + len(joints.phi)])
-        motor = -drive.reshape(LEGS, JOINTS) if robot.servo.mode == "kinematic" else motor
-        multipliers = multiplier.reshape(-1, MULTIPLIERS)
-        return Accelerations(dv.reshape(BODIES, 6), multipliers, motor, gear)
-    if rotors is None:
-        raise ValueError("rotors: got None, expected the state of the elastic gears' rotors")
-    # with the rotors behind elastic gears: J_r m + J_r/n P dv = torque
-    on_link, count = link_torques(robot, body, rotors), LEGS * JOINTS
-    g = forces + joints.G.T @ (on_link + stop_torques(robot, body)).ravel()
-    coupling = spin_inertia(robot.servo) * carried_turns(robot, joints.G)
-    M = link_matrix(robot, body, joints)
-    W = np.block([[M, coupling.T], [coupling, robot.servo.rotor_inertia * np.eye(count)]])
-    right = np.concatenate([g, (motor + gear - on_link).ravel()])
-    D = np.hstack([D, np.zeros((len(D), count))])
-    dv, m, multiplier = np.split(solve_constrained(W, right, D, c), [len(M), len(W)])
-    multipliers, rotor = multiplier.reshape(-1, MULTIPLIERS), m.reshape(LEGS, JOINTS)
-    return Accelerations(dv.reshape(BODIES, 6), multipliers, motor, gear, rotor)
+    g = forces + joints.G.T @ (motor + gear + stop_torques(robot, body)).ravel()
+    solution = solve_constrained(mass_matrix(robot, body, joints), g, D, c)
+    dv, multiplier, drive = np.split(solution, [6 * BODIES, 6 * BODIES + len(joints.phi)])
+    motor = -drive.reshape(LEGS, JOINTS) if robot.servo.mode == "kinematic" else motor
+    multipliers = multiplier.reshape(-1, MULTIPLIERS)
+    return Accelerations(dv.reshape(BODIES, 6), multipliers, motor, gear)
 
 
 def joint_reactions(robot: Robot, body: Array, multipliers: Array) -> tuple[Array, Array]:

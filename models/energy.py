@@ -18,32 +18,29 @@ from hexapod_cosim.models.dynamics import (
     constraints,
     joint_overruns,
     masses,
-    rotor_speeds,
+    spin_inertia,
     world_inertias,
 )
-from hexapod_cosim.models.kinematics import joint_models, rotation_matrix
+from hexapod_cosim.models.kinematics import joint_models, joint_speeds, rotation_matrix
 from hexapod_cosim.models.records import Robot
-from hexapod_cosim.models.servos.gear import Rotors, gear_energy, spin_inertia
 
 
-def kinetic_energy(robot: Robot, body: Array, rotors: Rotors | None = None) -> float:
-    """Returns the kinetic energy [J] of the bodies (19, 13) and the geared rotors; rotors: those of
-    elastic gears, None: rigid gears.
-    """
+def kinetic_energy(robot: Robot, body: Array) -> float:
+    """Returns the kinetic energy [J] of the bodies (19, 13) and the geared rotors."""
     v, w = body[:, 7:10], body[:, 10:13]
     linear = masses(robot) @ np.sum(v * v, axis=1)
     angular = np.einsum("ki,kij,kj->", w, world_inertias(robot, body), w)
-    speed = rotor_speeds(robot, body, rotors)
+    speed = joint_speeds(robot, body)
     geared = robot.servo.rotor_inertia * np.sum(speed**2)
     turns = carried_turns(robot, constraints(robot, body).G) @ body[:, 7:13].ravel()
     carried = spin_inertia(robot.servo) * float(speed.ravel() @ turns)
     return 0.5 * float(linear + angular + geared) + carried
 
 
-def potential_energy(robot: Robot, body: Array, rotors: Rotors | None = None) -> float:
+def potential_energy(robot: Robot, body: Array) -> float:
     """Returns the potential energy [J] of gravity, 0 at the world's origin, of the contacts with
-    rigid ground, 2/5 w K delta^2.5 each with its share w, of those between legs, of the joints'
-    stops, and of elastic gears with these rotors.
+    rigid ground, 2/5 w K delta^2.5 each with its share w, of those between legs, and of the
+    joints' stops.
     """
     gravity = -float(masses(robot) @ (body[:, 0:3] @ np.array(robot.gravity)))
     open_ = open_contacts(robot)
@@ -54,9 +51,8 @@ def potential_energy(robot: Robot, body: Array, rotors: Rotors | None = None) ->
     depth = np.array([max(contact.penetration, 0.0) for contact in contacts])
     pairs = np.array([max(contact.penetration, 0.0) for contact in pair_contacts(robot, body)])
     stops = float(np.sum(stop_energy(robot.servo, joint_overruns(robot, body))))
-    gears = 0.0 if rotors is None else float(np.sum(gear_energy(robot.servo, rotors.deflection)))
     elastic = float(shares @ depth**2.5) + float(np.sum(pairs**2.5))
-    return gravity + 0.4 * robot.contact.stiffness * elastic + stops + gears
+    return gravity + 0.4 * robot.contact.stiffness * elastic + stops
 
 
 def centre_of_mass(robot: Robot, body: Array) -> Array:
@@ -64,17 +60,16 @@ def centre_of_mass(robot: Robot, body: Array) -> Array:
     return masses(robot) @ body[:, 0:3] / robot.total_mass
 
 
-def momentum(robot: Robot, body: Array, rotors: Rotors | None = None) -> tuple[Array, Array]:
+def momentum(robot: Robot, body: Array) -> tuple[Array, Array]:
     """Returns linear momentum (3,) [kg m/s] and angular momentum (3,) about the world's origin [kg
     m2/s].
 
     The spin of the rotors (eq. 57) is included with a gear ratio; without one it is left out.
-    rotors: those of elastic gears, None: rigid gears.
     """
     linear = masses(robot)[:, None] * body[:, 7:10]
     spin = np.einsum("kij,kj->ki", world_inertias(robot, body), body[:, 10:13])
     about = (np.cross(body[:, 0:3], linear) + spin).sum(axis=0)
-    h = spin_inertia(robot.servo) * rotor_speeds(robot, body, rotors).ravel()
+    h = spin_inertia(robot.servo) * joint_speeds(robot, body).ravel()
     for joint, size in zip(joint_models(robot), h, strict=True):
         about = about + size * (rotation_matrix(body[joint.parent, 3:7]) @ joint.s_i)
     return linear.sum(axis=0), about

@@ -28,18 +28,15 @@ from hexapod_cosim.models.errors import HexapodError
 from hexapod_cosim.models.kinematics import (
     BODIES,
     BODY_STATE,
-    JOINTS,
     LEGS,
     cross,
     joint_models,
-    joint_speeds,
     quaternion_product,
     quaternion_rate,
     rotation_matrix,
 )
 from hexapod_cosim.models.method import METHOD, Method, method_step
 from hexapod_cosim.models.records import Robot
-from hexapod_cosim.models.servos.gear import Rotors, is_elastic
 from hexapod_cosim.models.stage import Slopes, keep_slopes, solve_stage
 
 STEP_FLOOR = 1e-11  # s  the error control fails below this step
@@ -47,9 +44,7 @@ TOUCH_DEPTH = (1e-10, 1e-6)  # m, m per tolerance  depth to which a touch-down i
 FIRST_STEP_SIZE = 1e-4  # s  first step
 ERROR_SCALE = np.array([0.1] * 3 + [1.0] * 4 + [1.0] * 3 + [10.0] * 3)  # of r p v w
 BRISTLE_SCALE = 10.0  # preslidings, or shear displacements of soil
-ROTOR_SCALE = np.array([0.1, 10.0])[:, None]  # rad, rad/s  deflections and speeds of rotors
 TURN, BODY = 3 * BODIES, BODY_STATE * BODIES  # sizes of a stage's first two parts
-GRIP = 3 * LEGS  # of its bristles
 
 
 @dataclass(frozen=True)
@@ -66,7 +61,6 @@ class State:
     rejected: int = 0
     touchdowns: int = 0
     evaluations: int = 0
-    rotors: Rotors | None = None  # of elastic gears
 
     @property
     def damping(self) -> Array:
@@ -86,7 +80,6 @@ class Trial:
     body: Array  # (19, 13)
     bristle: Array  # (6, 3)
     error: float  # 1  error over the tolerance; 0 without an estimate
-    rotors: Rotors | None = None  # of elastic gears
 
 
 @dataclass(frozen=True)
@@ -112,10 +105,7 @@ def start_state(robot: Robot, body: Array, time: float = 0.0) -> State:
     """Returns the state at bodies (19, 13) with the contacts of `start_contacts`."""
     first = min(FIRST_STEP_SIZE, robot.solver.step_max)
     still = np.zeros((LEGS, 3))
-    state = State(body, still, start_contacts(robot, body), time, first, first)
-    if not is_elastic(robot.servo):
-        return state
-    return replace(state, rotors=Rotors(np.zeros((LEGS, JOINTS)), joint_speeds(robot, body)))
+    return State(body, still, start_contacts(robot, body), time, first, first)
 
 
 # one step
@@ -124,71 +114,53 @@ def start_state(robot: Robot, body: Array, time: float = 0.0) -> State:
 def try_step(start: Start, h: float) -> Trial:
     """Computes one step of h [s] by the solver's method (eq. 19, 20), with its error (eq. 22).
 
-    The vector that eq. 19 advances contains the rotations of bodies (57,), the bodies (247,), the
-    bristles (18,) and, with elastic gears, deflections and speeds of rotors (36,). Later stages
-    need the first part, because quaternion rates alone do not give the angular velocities.
+    The vector that eq. 19 advances contains the rotations of bodies (57,), the bodies (247,) and
+    the bristles (18,). Later stages need the first part, because quaternion rates alone do not give
+    the angular velocities.
     """
     robot, method, solver = start.robot, start.method, start.robot.solver
     z, kept = h * method.gamma, list[Slopes]()
 
     def stage(elapsed: float, y: Array, change: Array) -> Array:
-        _, body, bristle, rotors = _parts(y)
+        _, body, bristle = _parts(y)
         command = replace(start.command, age=start.command.age + elapsed)
         at = (robot, body, bristle, command, start.state.contacts)
         if not kept:
-            kept.append(keep_slopes(*at, ahead=h, rotors=_rotors(rotors)))
-        shifts, turned = _shifts(change)
-        rate = solve_stage(*at, kept[0], z, shifts, _rotors(rotors), turned)
+            kept.append(keep_slopes(*at, ahead=h))
+        rate = solve_stage(*at, kept[0], z, _shifts(change))
         nu, alpha = rate.nu.reshape(BODIES, 6), rate.alpha.reshape(BODIES, 6)
         turns = [quaternion_rate(p, w) for p, w in zip(body[:, 3:7], nu[:, 3:6], strict=True)]
         moved = np.hstack([nu[:, 0:3], turns, alpha])
-        gears = np.zeros(0) if rate.rotors is None else rate.rotors.ravel()
-        return np.concatenate([nu[:, 3:6].ravel(), moved.ravel(), rate.bristle.ravel(), gears])
+        return np.concatenate([nu[:, 3:6].ravel(), moved.ravel(), rate.bristle.ravel()])
 
     state = start.state
-    gears = [] if state.rotors is None else [state.rotors.deflection, state.rotors.speed]
-    y_0 = np.concatenate(
-        [np.zeros(TURN), *(part.ravel() for part in (state.body, state.bristle, *gears))]
-    )
+    y_0 = np.concatenate([np.zeros(TURN), state.body.ravel(), state.bristle.ravel()])
     y_1, estimate = method_step(method, stage, y_0, h)
-    _, body, bristle, rotors = _parts(y_1)
+    _, body, bristle = _parts(y_1)
     error = error_norm(robot, estimate[TURN:]) if solver.step == 0.0 else 0.0
     body[:, 3:7] /= np.linalg.norm(body[:, 3:7], axis=1, keepdims=True)
     if solver.projection == "step":
         body = project(robot, body)
-    return Trial(body, bristle, error, _rotors(rotors))
+    return Trial(body, bristle, error)
 
 
-def _parts(y: Array) -> tuple[Array, Array, Array, Array]:
-    """Returns turns (19, 3), bodies (19, 13), bristles (6, 3) and rotors (2, 6, 3) or (0, 6, 3)."""
-    turn, body, bristle, rotors = np.split(y, [TURN, TURN + BODY, TURN + BODY + GRIP])
-    shape = (-1, LEGS, JOINTS)
-    return (
-        turn.reshape(BODIES, 3),
-        body.reshape(BODIES, BODY_STATE),
-        bristle.reshape(LEGS, 3),
-        rotors.reshape(shape),
-    )
+def _parts(y: Array) -> tuple[Array, Array, Array]:
+    """Returns turns (19, 3), bodies (19, 13) and bristles (6, 3)."""
+    turn, body, bristle = np.split(y, [TURN, TURN + BODY])
+    return turn.reshape(BODIES, 3), body.reshape(BODIES, BODY_STATE), bristle.reshape(LEGS, 3)
 
 
-def _rotors(part: Array) -> Rotors | None:
-    """Returns the rotors of a part of `_parts`, None where there are none."""
-    return Rotors(part[0], part[1]) if len(part) else None
-
-
-def _shifts(change: Array) -> tuple[tuple[Array, Array, Array], Array]:
-    """Returns s_x (114,), s_v (114,) and s_b (6, 3) of the sums over earlier stages, and those of
-    the rotors (2, 6, 3).
-    """
-    turn, body, bristle, rotors = _parts(change)
+def _shifts(change: Array) -> tuple[Array, Array, Array]:
+    """Returns s_x (114,), s_v (114,) and s_b (6, 3) of the sums over earlier stages."""
+    turn, body, bristle = _parts(change)
     s_x = np.hstack([body[:, 0:3], turn])
-    return (s_x.ravel(), body[:, 7:13].ravel(), bristle), rotors
+    return s_x.ravel(), body[:, 7:13].ravel(), bristle
 
 
 def error_norm(robot: Robot, estimate: Array) -> float:
     """Returns the largest entry of an error estimate over its scale and the tolerance (eq. 22).
 
-    The estimate has the parts of `try_step` without the rotations (265,), or (301,) with rotors.
+    The estimate has the parts of `try_step` without the rotations (265,).
 
     Quaternions of links are those of their joints' axes a, b, s, as in the C plant.
     """
@@ -199,11 +171,8 @@ def error_norm(robot: Robot, estimate: Array) -> float:
     largest = float(np.max(np.abs(body) / ERROR_SCALE))
     length = bristle_length(robot)
     if length > 0.0:
-        bristle = float(np.max(np.abs(estimate[BODY : BODY + GRIP])))
+        bristle = float(np.max(np.abs(estimate[BODY:])))
         largest = max(largest, bristle / (BRISTLE_SCALE * length))
-    rotors = np.abs(estimate[BODY + GRIP :]).reshape(2, -1) / ROTOR_SCALE
-    if rotors.size:
-        largest = max(largest, float(np.max(rotors)))
     return largest / robot.solver.tolerance
 
 
@@ -322,7 +291,6 @@ def end_step(start: Start, h: float, trial: Trial) -> State:
         state,
         body=trial.body,
         bristle=np.where(is_open[:, None], 0.0, trial.bristle),
-        rotors=trial.rotors,
         contacts=switched,
         touchdowns=state.touchdowns + touchdowns,
     )

@@ -6,9 +6,9 @@ of a standing tripod sink in as deep as with Hertz's law, its damping so that a 
 restitution. Friction is Coulomb's, with an elliptic cone; the feet's resistance to spin and rolling
 (eq. 38) becomes torsional and rolling friction. Joint stops (eq. 39) become limits with the same
 spring and damper. Viscous friction becomes the joint's damping, and a motor's back-EMF a part of
-kv. The servos' torque-speed line, friction that depends on load and speed, elasticity and play of
-gears, the rotors' angular momentum, the tanh law's creep, static friction above the
-kinetic one and the contacts' viscous friction are omitted, and soil is rigid.
+kv. The servos' torque-speed line, friction that depends on load and speed, the rotors' angular
+momentum, the tanh law's creep, static friction above the kinetic one and the contacts' viscous
+friction are omitted, and soil is rigid.
 
 A robot without stops has limits of MuJoCo's own stiffness, which the plant does not have.
 

@@ -178,10 +178,6 @@ class Servo:
     overload_time: Annotated[float, Number("s", at_least=0.0, at_most=1e3)] = 0.0
     overload_duty: Annotated[float, Number("1", at_least=1e-6, at_most=1.0)] = 1.0
     overload_left: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.0
-    # gear between rotor and link (eq. 54-56), but in kinematic mode; stiffness 0: rigid
-    gear_stiffness: Annotated[float, Number("N m/rad", at_least=0.0, at_most=1e9)] = 0.0
-    gear_damping: Annotated[float, Number("N m s/rad", at_least=0.0, at_most=1e6)] = 0.0
-    backlash: Annotated[float, Number("rad", at_least=0.0, at_most=1.0)] = 0.0
     # turns of the rotor for one of the joint, < 0: against it (eq. 57); 0: no angular momentum
     gear_ratio: Annotated[float, Number("1", at_least=-1e6, at_most=1e6)] = 0.0
 

@@ -9,7 +9,7 @@ stage. With z = 0 it is eq. 1 itself, the stage of an explicit method.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,17 +34,13 @@ from hexapod_cosim.models.contact.law import normal_force, normal_slopes
 from hexapod_cosim.models.dynamics import (
     Command,
     applied_forces,
-    carried_turns,
     constraint_equations,
     constraints,
     external_torques,
     gear_loads,
     joint_overruns,
     joint_torques,
-    link_matrix,
-    link_torques,
     mass_matrix,
-    rotor_speeds,
     solve_constrained,
     stop_torques,
 )
@@ -52,7 +48,6 @@ from hexapod_cosim.models.friction import friction_drag as foot_drag
 from hexapod_cosim.models.friction import friction_grip, turning_slopes
 from hexapod_cosim.models.kinematics import BODIES, JOINTS, LEGS, joint_angles, joint_speeds
 from hexapod_cosim.models.records import Robot
-from hexapod_cosim.models.servos.gear import Rotors, gear_slopes, is_elastic, spin_inertia
 from hexapod_cosim.models.servos.motor import friction_drag, has_measured_friction
 from hexapod_cosim.models.soil.law import (
     body_shear_drag,
@@ -85,8 +80,6 @@ class Slopes:
     stop_stiffness: Array  # (6, 3) N m/rad
     stop_damping: Array  # (6, 3) N m s/rad
     contact: Mapping[int, ContactSlopes]  # of closed contacts, by their number
-    gear_stiffness: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))  # N m/rad
-    gear_damping: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))  # N m s/rad
 
 
 @dataclass(frozen=True)
@@ -96,7 +89,6 @@ class StageRate:
     nu: Array  # (114,)  m/s and rad/s, body by body
     alpha: Array  # (114,)  m/s2 and rad/s2
     bristle: Array  # (6, 3)  m/s
-    rotors: Array | None = None  # (2, 6, 3)  rad/s, rad/s2  deflections and speeds; None: rigid
 
 
 def keep_slopes(
@@ -106,21 +98,18 @@ def keep_slopes(
     command: Command,
     damping: Array | Contacts,
     ahead: float,
-    rotors: Rotors | None = None,
 ) -> Slopes:
     """Returns the derivatives of the forces at bodies (19, 13) and bristles (6, 3).
 
     The contacts' are taken at delta + ahead max(ddelta, 0), because a foot that has just touched
     down has neither depth nor derivatives yet, and W would miss its contact. damping: (6,) of the
-    feet [s/m], nan for open ones, or the state of all contacts. rotors: those of elastic gears,
-    whose derivatives are taken ahead, too; None: rigid gears.
+    feet [s/m], nan for open ones, or the state of all contacts.
     """
     contacts = damping if isinstance(damping, Contacts) else contacts_of(robot, damping)
-    angle, speed = joint_angles(robot, body), rotor_speeds(robot, body, rotors)
+    angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
     references = (command.angle_ref, command.speed_ref, command.torque_ref)
     motor = servo_slopes(robot.servo, angle, speed, *references, power=command.power)
-    link_speed = joint_speeds(robot, body)
-    stops = stop_slopes(robot.servo, joint_overruns(robot, body), link_speed)
+    stops = stop_slopes(robot.servo, joint_overruns(robot, body), speed)
     found = {}
     for k, point, state, contact in closed_contacts(robot, body, contacts):
         turn = body[point.sphere.body, 10:13]
@@ -133,7 +122,7 @@ def keep_slopes(
             found[k] = rigid_slopes(robot, point, state, contact, deflection, turn, ahead)
     drag = gear_drag(robot.servo, speed)
     if has_measured_friction(robot.servo):
-        forces = applied_forces(robot, body, command, contacts, bristle, rotors=rotors).ravel()
+        forces = applied_forces(robot, body, command, contacts, bristle).ravel()
         load = external_torques(robot, body, command, forces, constraints(robot, body))
         kinematic = robot.servo.mode == "kinematic"
         torque = (
@@ -142,11 +131,7 @@ def keep_slopes(
             else servo_torque(robot.servo, angle, speed, *references, power=command.power)
         )
         drag = friction_drag(robot.servo, speed, torque, load)
-    slopes = Slopes(*motor, drag, *stops, found)
-    if rotors is None:
-        return slopes
-    gear = gear_slopes(robot.servo, rotors.deflection, speed - link_speed, ahead)
-    return replace(slopes, gear_stiffness=gear[0], gear_damping=gear[1])
+    return Slopes(*motor, drag, *stops, found)
 
 
 def expected_depth(contact: FootContact, ahead: float) -> float:
@@ -214,9 +199,8 @@ def slope_matrices(
     of each contact along its normal n and, by its drag alone, across it, and of the moments of spin
     and rolling on the tibia.
     """
-    motor = 0.0 if is_elastic(robot.servo) else 1.0  # it acts on the rotors
-    damping = motor * (slopes.motor_damping + slopes.gear_drag) + slopes.stop_damping
-    stiffness = motor * slopes.motor_stiffness + slopes.stop_stiffness
+    damping = slopes.motor_damping + slopes.gear_drag + slopes.stop_damping
+    stiffness = slopes.motor_stiffness + slopes.stop_stiffness
     G_x = -G.T @ (stiffness.reshape(-1, 1) * G)
     G_v = -G.T @ (damping.reshape(-1, 1) * G)
     for k, point, _, contact in closed_contacts(robot, body, contacts):
@@ -269,8 +253,6 @@ def solve_stage(
     slopes: Slopes,
     z: float,
     change: tuple[Array, Array, Array],
-    rotors: Rotors | None = None,
-    rotor_change: Array | None = None,
 ) -> StageRate:
     """Solves eq. 20 at bodies (19, 13) and bristles (6, 3) with dense matrices.
 
@@ -281,8 +263,6 @@ def solve_stage(
         slopes: those of the step's first stage.
         z: h gamma [s]; 0 for explicit methods.
         change: s_x (114,), s_v (114,) and s_b (6, 3), the sums of g_ij k_j over earlier stages.
-        rotors: those of elastic gears at y_i; None: rigid gears.
-        rotor_change: (2, 6, 3), the same sums of their deflections and speeds; None: 0.
     """
     contacts = damping if isinstance(damping, Contacts) else contacts_of(robot, damping)
     s_x, s_v, s_b = change
@@ -291,13 +271,11 @@ def solve_stage(
     G_x, G_v = slope_matrices(robot, body, contacts, slopes, G)
 
     # W = M - z G_v - z^2 G_x;  right = g + G_v s_v + G_x (s_x + z (v + s_v))
-    g = applied_forces(robot, body, command, contacts, bristle, rotors=rotors).ravel()
+    g = applied_forces(robot, body, command, contacts, bristle).ravel()
     load = gear_loads(robot, body, command, g, joints)
-    motor, gear = joint_torques(robot, body, command, load, rotors)
-    on_links = motor + gear if rotors is None else link_torques(robot, body, rotors)
-    g += G.T @ (on_links + stop_torques(robot, body)).ravel()
-    M = mass_matrix(robot, body, joints) if rotors is None else link_matrix(robot, body, joints)
-    W = M - z * G_v - z * z * G_x
+    motor, gear = joint_torques(robot, body, command, load)
+    g += G.T @ (motor + gear + stop_torques(robot, body)).ravel()
+    W = mass_matrix(robot, body, joints) - z * G_v - z * z * G_x
     right = g + G_v @ s_v + G_x @ (s_x + z * (v + s_v))
 
     # bristles: a spring across the normal, -G_b/(1 + z beta), stretched by s_b + z (db/dt + s_v)
@@ -308,63 +286,11 @@ def solve_stage(
         right -= spring * sole.T.T @ (s_b[sole.leg] + z * (sole.rate + sole.T @ s_v))
     # [W  D^T; D  0] [alpha; lambda] = [right; c]
     D, c = constraint_equations(robot, body, command, joints)
-    turning = None
-    if rotors is None:
-        alpha = solve_constrained(W, right, D, c)[: 6 * BODIES]
-    else:
-        shift = s_x + z * (v + s_v), s_v
-        stage = RotorStage(robot, slopes, rotors, z, G, G @ v, *(G @ part for part in shift))
-        moved = np.zeros((2, LEGS, JOINTS)) if rotor_change is None else rotor_change
-        torque = (motor + gear - on_links).ravel()
-        alpha, turning = stage.solve(W, right, D, c, torque, moved.reshape(2, -1))
+    alpha = solve_constrained(W, right, D, c)[: 6 * BODIES]
 
     # nu = v + s_v + z alpha;  k_b/h = (db/dt + s_v + z alpha - beta s_b)/(1 + z beta)
     rate = np.zeros((LEGS, JOINTS))
     for sole in soles:
         moved = sole.rate + sole.T @ (s_v + z * alpha) - sole.law.beta * s_b[sole.leg]
         rate[sole.leg] = moved / (1.0 + z * sole.law.beta)
-    return StageRate(v + s_v + z * alpha, alpha, rate, turning)
-
-
-@dataclass(frozen=True)
-class RotorStage:
-    """The rotors behind elastic gears in a stage (eq. 56), with their accelerations as unknowns."""
-
-    robot: Robot
-    slopes: Slopes
-    rotors: Rotors
-    z: float  # s
-    G: Array  # (18, 114)
-    speed: Array  # (18,) rad/s  of the joints
-    angle_shift: Array  # (18,) rad  of the joints
-    speed_shift: Array  # (18,) rad/s
-
-    def solve(
-        self, W: Array, right: Array, D: Array, c: Array, torque: Array, moved: Array
-    ) -> tuple[Array, Array]:
-        """Returns alpha (114,) and the rates (2, 6, 3) of deflections and speeds of the rotors.
-
-        W, right, D, c: the stage's equations without the rotors' parts. torque: on the rotors at
-        y_i (18,) [N m]; moved: sums of earlier stages (2, 18).
-        """
-        z, G, slopes = self.z, self.G, self.slopes
-        spring, damper = slopes.gear_stiffness.ravel(), slopes.gear_damping.ravel()
-        motor = slopes.motor_stiffness.ravel()
-        drag = (slopes.motor_damping + slopes.gear_drag).ravel()
-        # deflections and rotors at the end of the stage, without alpha and m
-        faster = moved[1] - self.speed_shift
-        rate = self.rotors.speed.ravel() - self.speed + faster
-        shift = moved[0] + z * rate
-        give = spring * shift + damper * faster
-        torque = torque - give - motor * (self.angle_shift + shift) - drag * moved[1]
-        # [W + G^T E G, (P J/n - E G)^T; P J/n - E G, J + z drag + z^2 motor + E] [alpha; m]
-        E = z * damper + z * z * spring
-        coupling = spin_inertia(self.robot.servo) * carried_turns(self.robot, G)
-        across = coupling - E[:, None] * G
-        inertia = self.robot.servo.rotor_inertia + z * drag + z * z * motor + E
-        whole = np.block([[W + G.T @ (E[:, None] * G), across.T], [across, np.diag(inertia)]])
-        force = np.concatenate([right + G.T @ give, torque])
-        D = np.hstack([D, np.zeros((len(D), len(E)))])
-        alpha, m = np.split(solve_constrained(whole, force, D, c)[: len(whole)], [len(W)])
-        rates = np.array([rate + z * (m - G @ alpha), m])
-        return alpha, rates.reshape(2, LEGS, JOINTS)
+    return StageRate(v + s_v + z * alpha, alpha, rate)

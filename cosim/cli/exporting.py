@@ -237,8 +237,6 @@ def left_out(servo: Servo, form: Format) -> list[str]:
         "heat": servo.drive == "motor" and servo.winding_capacity > 0.0,
         "the supply's resistance": servo.drive == "motor" and servo.supply_resistance > 0.0,
         "the bus and the steps of commands": servo.bus_period > 0.0 or servo.command_step > 0.0,
-        "the elasticity of the gears": servo.gear_stiffness > 0.0,
-        "backlash": servo.backlash > 0.0,
         "the rotors' angular momentum": servo.gear_ratio != 0.0,
     }
     return [name for name, present in facts.items() if present]

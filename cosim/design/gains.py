@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from hexapod_cosim.controller import Gains, GainsError, Requirements
 from hexapod_cosim.controller.design import StandingPlant, design_gains
 from hexapod_cosim.controller.design.synthesis import check_period, check_position_servos
+from hexapod_cosim.controller.gains_file import raising_gains_errors
 from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.design.linearise import Motion, linearise
@@ -20,6 +21,7 @@ from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.models import LEG_NAMES, Robot, unknown_name
 from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.schema import specs
 
 STANCES: Mapping[str, Sequence[str]] = {
     "six legs": LEG_NAMES,
@@ -28,7 +30,6 @@ STANCES: Mapping[str, Sequence[str]] = {
 }
 OWN_WEIGHT = 1.0
 LOADS = (0.1, OWN_WEIGHT, 2.0)  # 1    mean load of the standing legs, in thirds of the weight
-NO_MARGIN = 180.0  # deg    phase margin that no loop with a crossing has
 
 
 def design_for(robot: Robot, period: float, requirements: Requirements | None = None) -> Gains:
@@ -38,11 +39,6 @@ def design_for(robot: Robot, period: float, requirements: Requirements | None = 
         return design_gains(
             robot, period, plants=plants, requirements=requirements, left_out=left_out
         )
-
-
-def standing_plants(robot: Robot, period: float) -> dict[str, StandingPlant]:
-    """Returns the plants of `examine_stances`."""
-    return examine_stances(robot, period)[0]
 
 
 def examine_stances(
@@ -150,12 +146,6 @@ def read_requirements(settings: Sequence[str], robot: Robot) -> Requirements:
                 fix="give a number in SI units",
                 where=name,
             ) from error
-    if not 0.0 <= values.get("phase_margin", 0.0) < NO_MARGIN:
-        raise GainsError(
-            "value not allowed",
-            got=values["phase_margin"],
-            expected=f"a number >= 0 and < {NO_MARGIN:g} [deg]",
-            fix="write --set phase_margin=50",
-            where="phase_margin",
-        )
-    return requirements_for(robot, **values)
+    with raising_gains_errors():
+        checked = {name: specs(Requirements)[name].read(values[name], name) for name in values}
+    return requirements_for(robot, **checked)

@@ -12,9 +12,9 @@ ground (0.1 mm and more), the slip speed at which friction saturates (10 mm/s), 
 which the gear's friction saturates (50 mrad/s); and large against the round-off of a start, 1e-15 m
 in a contact of 5e4 N/m.
 
-Three things are left out: the servos' torque limits, which small motions do not reach but a heavy
-load does, the elasticity and play of gears, and the error control, whose choice of steps would be
-noise. Steps are fixed, and short against the times in which a foot swings on the ground.
+Two things are left out: the servos' torque limits, which small motions do not reach but a heavy
+load does, and the error control, whose choice of steps would be noise. Steps are fixed, and short
+against the times in which a foot swings on the ground.
 """
 
 from __future__ import annotations
@@ -50,7 +50,6 @@ DRY = (
     "quadratic_motor_friction",
     "quadratic_external_friction",
 )
-ELASTIC = ("gear_stiffness", "backlash")  # fields of elastic gears; the design takes rigid ones
 TORQUE = 1e-4  # N m    difference, for servos of STIFFNESS; scales with the stiffness
 STIFFNESS = 40.0  # N m/rad
 LONGEST_STEP = 5e-4  # s    of the integration, for the usual size of robot
@@ -112,10 +111,10 @@ class Bench:
         self._sizes, self._torque = difference_sizes(size), TORQUE * (robot.servo.kp / STIFFNESS)
         step = period / math.ceil(period / (LONGEST_STEP * size.time) - 1e-9)
         plain = ["servo.coulomb_friction", "servo.torque_max", "friction.slope", "solver.step"]
-        servo = [f"servo.{name}" for name in (*DRY, *ELASTIC)]
+        servo = [f"servo.{name}" for name in DRY]
         self._settings = plant.block([*plain, *servo])
         dry = [getattr(robot.servo, name) if coulomb_friction > 0.0 else 0.0 for name in DRY]
-        self._settings.values[:] = coulomb_friction, UNLIMITED, slope, step, *dry, 0.0, 0.0
+        self._settings.values[:] = coulomb_friction, UNLIMITED, slope, step, *dry
         seen = [
             *vector_names("torso.position"), *MEASURED["quaternion"], *MEASURED["angle"],
             *TORSO_RATES, *MEASURED["speed"],

@@ -512,9 +512,6 @@ static const hxDefinition default_definition = {
     .servo.overload_time = 0.0,
     .servo.overload_duty = 1.0,
     .servo.overload_left = 0.0,
-    .servo.gear_stiffness = 0.0,
-    .servo.gear_damping = 0.0,
-    .servo.backlash = 0.0,
     .servo.gear_ratio = 0.0,
 };
 
@@ -1155,9 +1152,6 @@ static const hxRange definition_ranges[] = {
     {"servo.overload_time", "s", 0.0, 1000.0, offsetof(hxDefinition, servo.overload_time), 0},
     {"servo.overload_duty", "", 1e-06, 1.0, offsetof(hxDefinition, servo.overload_duty), 0},
     {"servo.overload_left", "", 0.0, 1.0, offsetof(hxDefinition, servo.overload_left), 0},
-    {"servo.gear_stiffness", "N.m/rad", 0.0, 1000000000.0, offsetof(hxDefinition, servo.gear_stiffness), 0},
-    {"servo.gear_damping", "N.m.s/rad", 0.0, 1000000.0, offsetof(hxDefinition, servo.gear_damping), 0},
-    {"servo.backlash", "rad", 0.0, 1.0, offsetof(hxDefinition, servo.backlash), 0},
     {"servo.gear_ratio", "", -1000000.0, 1000000.0, offsetof(hxDefinition, servo.gear_ratio), 0},
 };
 

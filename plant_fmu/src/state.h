@@ -18,9 +18,8 @@ enum {
   HX_SLOTS = 8, /* legs in memory, padded: slots past the last leg mirror leg 0 */
   HX_TORSO_SIZE = 16,
   HX_BODIES_SIZE = HX_TORSO_SIZE + HX_JOINTS * HX_BODY_STATE * HX_SLOTS,
-  HX_BRISTLE_SIZE = 3 * HX_SLOTS,          /* of one row of contacts */
-  HX_GEAR_SIZE = 2 * HX_JOINTS * HX_SLOTS, /* of elastic gears */
-  HX_MOTION_SIZE = HX_BODIES_SIZE + HX_BRISTLE_SIZE + HX_GEAR_SIZE
+  HX_BRISTLE_SIZE = 3 * HX_SLOTS, /* of one row of contacts */
+  HX_MOTION_SIZE = HX_BODIES_SIZE + HX_BRISTLE_SIZE
 };
 
 /* Rows of contacts: of each, a slot has one. Those before the torso's are spheres on the tibia that
@@ -75,9 +74,7 @@ typedef union hxPlantMotion {
     double torso[HX_BODY_STATE];
     double actuator_work, push_work, dissipated; /* J */
     double link[HX_JOINTS][HX_BODY_STATE][HX_SLOTS];
-    double bristle[3][HX_SLOTS];             /* m  b of eq. 16, world axes; other laws skip it */
-    double deflection[HX_JOINTS][HX_SLOTS];  /* rad    rotor less link; rigid gears skip both */
-    double motor_speed[HX_JOINTS][HX_SLOTS]; /* rad/s  of the rotor, seen at the joint */
+    double bristle[3][HX_SLOTS]; /* m  b of eq. 16, world axes; other laws skip it */
   };
 } hxPlantMotion;
 
@@ -125,7 +122,6 @@ typedef struct hxModel {
   int servo_drive;                  /* hxServoDrive */
   int measured_friction;            /* 1: the gears have more than Coulomb friction */
   int stribeck;                     /* 1: it has Stribeck terms */
-  int elastic;                      /* 1: the gears are elastic; 2: and have play */
   int spin;                         /* 1: the rotors have angular momentum (eq. 57) */
   int has_soil; /* 1: the ground may be soil, of the definition or of a material of the terrain */
   int rows, foot_rows, torso_rows; /* computed: on tibias, of these on feet, on the torso (0, 1) */
@@ -152,9 +148,7 @@ typedef struct hxModel {
   double stribeck_motor, stribeck_external;     /* 1  K_ms, K_es */
   double quadratic_motor, quadratic_external;   /* 1/(N m)  K_mq, K_eq */
   double per_stribeck_speed, stribeck_exponent; /* s/rad, 1  1/w_s, a */
-  double gear_stiffness, gear_damping;          /* N m/rad, N m s/rad  eq. 54 */
-  double half_play, tooth_edge; /* rad  half of the play, half of the way on which teeth engage */
-  double spin_inertia;          /* kg m2  of the rotor, times its gear ratio (eq. 57) */
+  double spin_inertia; /* kg m2  of the rotor, times its gear ratio (eq. 57) */
   double voltage, duty_max, supply_resistance; /* V, 1, ohm */
   hxHeat heat;
   double bus_period, command_step; /* s, rad  0 in kinematic mode */
@@ -244,15 +238,13 @@ typedef struct hxContactMoment {
 
 /* Joints and contacts at one end of a step, from which its works and peaks are computed. */
 typedef struct hxMoment {
-  double angle[HX_JOINTS][HX_SLOTS];       /* rad */
-  double speed[HX_JOINTS][HX_SLOTS];       /* rad/s */
-  double turn[3][HX_SLOTS];                /* rad/s  of the tibias, world axes */
-  double time;                             /* s */
-  double stale;                            /* 1      1: coordinates were set since */
-  hxContactMoment contact[HX_ROWS];        /* the model's rows are set */
-  double share[HX_FOOT_ROWS][HX_SLOTS];    /* 1  of feet on blocks (ground/sharing.h) */
-  double deflection[HX_JOINTS][HX_SLOTS];  /* rad    of elastic gears */
-  double motor_speed[HX_JOINTS][HX_SLOTS]; /* rad/s  of their rotors */
+  double angle[HX_JOINTS][HX_SLOTS];    /* rad */
+  double speed[HX_JOINTS][HX_SLOTS];    /* rad/s */
+  double turn[3][HX_SLOTS];             /* rad/s  of the tibias, world axes */
+  double time;                          /* s */
+  double stale;                         /* 1      1: coordinates were set since */
+  hxContactMoment contact[HX_ROWS];     /* the model's rows are set */
+  double share[HX_FOOT_ROWS][HX_SLOTS]; /* 1  of feet on blocks (ground/sharing.h) */
 } hxMoment;
 
 /* Forces at the last completed step of an importer's solver (model exchange). */
@@ -332,23 +324,12 @@ struct hxPlant {
   void *scratch;         /* of the kernels, see kernel.h: the rest of the work space */
 };
 
-/* Copies the elastic gears of a moment. */
-static inline void hx_copy_gears(hxMoment *to, const hxMoment *from) {
-  memcpy(to->deflection, from->deflection, sizeof to->deflection);
-  memcpy(to->motor_speed, from->motor_speed, sizeof to->motor_speed);
-}
-
 /* Copies the parts of a state that a step of this model changes. */
 static inline void hx_copy_state(const hxModel *model, hxState *to, const hxState *from) {
-  const size_t rest = offsetof(hxState, evaluations);
-  memcpy(to, from,
-         model->elastic ? offsetof(hxState, contact) : offsetof(hxState, motion.deflection));
-  to->contact = from->contact;
-  memcpy((char *)to + rest, (const char *)from + rest, offsetof(hxState, moment.contact[1]) - rest);
+  memcpy(to, from, offsetof(hxState, moment.contact[1]));
   for (int k = 1; k < model->listed; ++k)
     to->moment.contact[model->row[k]] = from->moment.contact[model->row[k]];
   if (model->foot_rows > 1) memcpy(to->moment.share, from->moment.share, sizeof to->moment.share);
-  if (model->elastic) hx_copy_gears(&to->moment, &from->moment);
 }
 
 /* Returns whether a row's contacts are those of feet. */

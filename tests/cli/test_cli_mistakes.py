@@ -37,7 +37,7 @@ from hexapod_cosim.cosim.cli import main
             ["simulate", "--set", "friction.mu=0.4mm"],
             ["got '0.4mm'", "a number without a unit", "write a plain number"],
         ),
-        (["design", "--set", "phase_margin=500"], ["got 500", "< 180 [deg]", "phase_margin=50"]),
+        (["design", "--set", "phase_margin=500"], ["phase_margin: ", "got 500", "< 180 [deg]"]),
         (["validate", "missing.fmu"], ["no such FMU"]),
         (["export", "--robot", "atena"], ["unknown robot", "did you mean 'athena'"]),
         (

@@ -32,7 +32,7 @@ from hexapod_cosim.controller.design.paper import (
     shifted,
 )
 from hexapod_cosim.controller.gains import Parts
-from hexapod_cosim.cosim.design.gains import design_for, read_requirements, standing_plants
+from hexapod_cosim.cosim.design.gains import design_for, examine_stances, read_requirements
 from hexapod_cosim.models import load_robot
 
 PERIOD = 0.005  # s
@@ -43,7 +43,7 @@ pytestmark = pytest.mark.usefixtures("plant_build")
 
 @cache
 def plants_of(name: str) -> dict[str, StandingPlant]:
-    return standing_plants(load_robot(name), PERIOD)
+    return examine_stances(load_robot(name), PERIOD)[0]
 
 
 @cache

@@ -177,6 +177,7 @@ SAYS = {
     "03_own_controller.py": ["completed", "deg"],
     "04_two_fmus.py": ["40 measurements, 72 commands", "walks 0.37"],
     "06_tunable.py": ["servo.kp 40 -> 69.6 N m/rad", "energy audit"],
+    "07_casadi.py": ["gradient    -3.72", "differences -3.72"],
     "05_robot_log.py": ["log.mcap: 801 rows, 108 columns", "hexapod identify log.mcap"],
 }
 

@@ -70,8 +70,6 @@ RELATED = [
     "servo.air_temperature",
     "servo.derate_temperature",
     "servo.temperature_max",
-    "servo.gear_stiffness",
-    "servo.backlash",
     "servo.gear_ratio",
 ]
 DEEP = "deep in the ground"  # a start with its feet below the ground is refused
@@ -162,7 +160,6 @@ def test_outputs_in_initialization_mode_are_those_of_the_values_set_so_far(plant
 GROUPS = {"motion", "forces", "servos", "reactions", "distances", "audit"}
 CASES: dict[str, tuple[dict[str, float], dict[str, int]]] = {
     "default": ({}, {}),
-    "elastic gears": ({"servo.gear_stiffness": 60.0, "servo.gear_damping": 0.1}, {}),
     "turning rotors": ({"servo.gear_ratio": 200.0}, {}),
     "measured friction": (
         {"servo.motor_load_friction": 0.1, "servo.viscous_friction": 0.1},

@@ -74,15 +74,7 @@ static void stops(hxDefinition *d) {
   d->servo.stop_stiffness = 200.0, d->servo.stop_damping = 1.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) d->leg[leg].link[0].angle_max = 0.05;
 }
-static void elastic(hxDefinition *d) {
-  d->servo.rotor_inertia = 0.01, d->servo.gear_stiffness = 300.0, d->servo.gear_damping = 0.5;
-  d->servo.backlash = 0.01;
-}
 static void rotors(hxDefinition *d) { d->servo.rotor_inertia = 0.01, d->servo.gear_ratio = 250.0; }
-static void turning_elastic(hxDefinition *d) {
-  elastic(d), rotors(d);
-  d->servo.backlash = 0.0;
-}
 static void drifting(hxDefinition *d) { d->solver.projection = HX_PROJECTION_NONE; }
 static void body(hxDefinition *d) {
   d->body.contact = HX_BODY_ON, d->body.self_contact = HX_SELF_FORCE;
@@ -128,9 +120,7 @@ static const hxChoice choices[] = {{"nothing", nothing, 0, 0.01},
                                    {"rubbing gear", rubbing_gear, 0, 0.01},
                                    {"bus", bus, 0, 0.01},
                                    {"stops", stops, 0, 0.01},
-                                   {"elastic", elastic, 0, 0.01},
                                    {"rotors", rotors, 0, 0.01},
-                                   {"turning elastic", turning_elastic, 0, 0.01},
                                    {"drifting", drifting, 0, 0.01},
                                    {"body", body, 0, 0.01},
                                    {"on its back", on_its_back, 0, 0.01},
@@ -187,7 +177,7 @@ static double largest_of(const double *x, size_t n) {
 }
 
 /* Accelerations are affine in a push on the torso, so the derivative by it is a difference. It is
- * not where friction depends on load, and elastic gears have no derivative. */
+ * not where friction depends on load. */
 static void check_derivative(hxPlant *plant, const hxDefinition *d, const char *name) {
   static const hxInput none;
   hxInput input, push = none;
@@ -196,7 +186,7 @@ static void check_derivative(hxPlant *plant, const hxDefinition *d, const char *
   command(&input, 5);
   push.push_force[0] = 1.0, push.push_torque[2] = 0.2;
   const hxStatus status = hx_plant_tangent(plant, &input, &push, NULL, &rate, &output);
-  CHECK(status == (d->servo.gear_stiffness > 0.0 ? HX_INVALID_ARGUMENT : HX_OK));
+  CHECK(status == HX_OK);
   if (status != HX_OK || d->servo.motor_load_friction > 0.0) return;
   hx_plant_rates(plant, &input, &before);
   input.push_force[0] += 1.0, input.push_torque[2] += 0.2;
@@ -304,14 +294,9 @@ static void stiff_turning(hxDefinition *d) {
   turning(d);
   d->friction.slope = 1e5, d->friction.spin_radius = d->friction.rolling_radius = 0.01;
 }
-static void stiff_rotors(hxDefinition *d) {
-  turning_elastic(d);
-  d->servo.gear_stiffness = 5000.0, d->servo.gear_damping = 20.0;
-}
-
 /* With steps of many time constants of its laws a robot that drops comes to rest. */
 static void long_steps_are_stable(void) {
-  static void (*const stiff[])(hxDefinition *) = {stiff_stops, stiff_turning, stiff_rotors, lugre};
+  static void (*const stiff[])(hxDefinition *) = {stiff_stops, stiff_turning, lugre};
   for (size_t k = 0; k < sizeof stiff / sizeof *stiff; ++k)
     for (int method = HX_METHOD_ROSW3; method <= HX_METHOD_ROS2; ++method) {
       hxDefinition d;
@@ -349,8 +334,6 @@ static void cold_limit(hxDefinition *d) { d->servo.temperature_max = d->servo.de
 static void cold_air(hxDefinition *d) {
   d->servo.derate_temperature = 300.0, d->servo.temperature_max = d->servo.air_temperature = 310.0;
 }
-static void no_rotor(hxDefinition *d) { elastic(d), d->servo.rotor_inertia = 0.0; }
-static void rigid_play(hxDefinition *d) { d->servo.backlash = 0.01, d->servo.gear_stiffness = 0.0; }
 static void heavy_rotor(hxDefinition *d) { rotors(d), d->servo.gear_ratio = 1.0; }
 static void no_rebound(hxDefinition *d) {
   d->contact.law = HX_CONTACT_FLORES, d->contact.restitution = 0.0;
@@ -380,8 +363,6 @@ static void contradictions_are_refused_by_name(void) {
                {no_housing, "servo.housing_capacity"},
                {cold_limit, "servo.temperature_max"},
                {cold_air, "servo.temperature_max"},
-               {no_rotor, "servo.gear_stiffness"},
-               {rigid_play, "servo.gear_stiffness"},
                {heavy_rotor, "servo.gear_ratio"},
                {no_rebound, "contact.restitution"},
                {weak_hold, "friction.mu_static"},

@@ -58,9 +58,9 @@ def logarithmic(low: float, high: float, seed: int) -> Array:
 
 
 def ground(law: str) -> dict[str, dict[str, Any]]:
-    """Returns the sections of a friction law, of elastic gears, or of soil under the feet."""
-    if law == "gears":
-        return {"servo": {"gear_stiffness": 400.0, "backlash": 0.01, "gear_ratio": 200.0}}
+    """Returns the sections of a friction law, of spinning rotors, or of soil under the feet."""
+    if law == "rotors":
+        return {"servo": {"gear_ratio": 200.0}}
     if law != "soil":
         return {"friction": {"law": law}}
     return {"soil": asdict(soil_preset("sandy_loam").soil), "foot": {"pad_radius": 0.02}}
@@ -98,7 +98,7 @@ def test_the_angle_of_a_half_angle_is_right_in_the_whole_turn(core: ct.CDLL) -> 
 
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("method", ["rosw3", "dp54"])
-@pytest.mark.parametrize("law", ["tanh", "bristle", "soil", "gears"])
+@pytest.mark.parametrize("law", ["tanh", "bristle", "soil", "rotors"])
 def test_the_motion_does_not_depend_on_the_lane_width(
     core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, method: str, law: str
 ) -> None:

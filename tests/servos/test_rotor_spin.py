@@ -11,18 +11,21 @@ from typing import Any
 import numpy as np
 import pytest
 from plant import Plant
-from states import changed, lopsided, random_bodies, random_command
+from states import changed, distance, lopsided, random_bodies, random_command
 from test_laws_servo import WEIGHTLESS
+from test_measured_servos import with_servo
 
 from hexapod_cosim.models import Robot
-from hexapod_cosim.models.dynamics import Command, joint_torques, world_inertias
-from hexapod_cosim.models.energy import momentum
+from hexapod_cosim.models.contact.geometry import standing_damping
+from hexapod_cosim.models.dynamics import Command, accelerations, joint_torques, world_inertias
+from hexapod_cosim.models.energy import kinetic_energy, momentum
+from hexapod_cosim.models.integrator import Start, end_step, start_state, try_step
 from hexapod_cosim.models.kinematics import joint_models, joint_speeds, rotation_matrix
 from hexapod_cosim.models.records import Array
-from hexapod_cosim.models.servos.gear import Rotors
 
 RATIO = -40.0  # few turns, so that the effect is large
-SAME = 1e-9  # relative, of sums over bodies
+SAME = 1e-9  # relative, of sums over bodies, and of the sweeps and the dense system
+TWIN = 1e-11  # relative, of steps
 HIGH = 10.0  # m
 
 
@@ -42,30 +45,16 @@ def thrown(core: ct.CDLL, robot: Robot) -> Plant:
     return Plant(core, robot, position=(0.0, 0.0, HIGH), angular_velocity=(1.0, -2.0, 1.5))
 
 
-def rotors_of(plant: Plant, command: Command) -> Rotors | None:
-    """Returns the rotors of a plant with elastic gears."""
-    if plant.robot.servo.gear_stiffness == 0.0:
-        return None
-    output = plant.output(command)
-    return Rotors(output.gear_deflection, output.motor_speed)
-
-
-@pytest.mark.parametrize(
-    "servo",
-    [{}, {"gear_stiffness": 200.0, "gear_damping": 0.05, "backlash": 0.01}, {"mode": "kinematic"}],
-    ids=["rigid", "elastic", "kinematic"],
-)
-def test_a_free_robot_keeps_its_momentum_with_that_of_its_rotors(
-    core: ct.CDLL, servo: dict[str, Any]
-) -> None:
-    robot = floating(**servo)
+@pytest.mark.parametrize("mode", ["position", "kinematic"])
+def test_a_free_robot_keeps_its_momentum_with_that_of_its_rotors(core: ct.CDLL, mode: str) -> None:
+    robot = floating(mode=mode)
     plant, command = thrown(core, robot), Command(angle_ref=robot.stance + 0.4)
     links = changed(robot, servo={"gear_ratio": 0.0})
-    before = momentum(robot, plant.bodies, rotors_of(plant, command))[1]
+    before = momentum(robot, plant.bodies)[1]
     alone = momentum(links, plant.bodies)[1]
     for k in range(1, 6):
         plant.step(0.02 * k, command)
-    after = momentum(robot, plant.bodies, rotors_of(plant, command))[1]
+    after = momentum(robot, plant.bodies)[1]
     assert after == pytest.approx(before, rel=1e-6, abs=1e-7 * float(np.linalg.norm(before)))
     exchanged = momentum(links, plant.bodies)[1] - alone
     assert float(np.linalg.norm(exchanged)) > 1e-4 * float(np.linalg.norm(before))
@@ -122,3 +111,29 @@ def test_joints_obey_newton_and_euler_with_rotors_as_bodies_of_their_own(
     pushed = np.cross(body[0, :3], command.push_force) + command.push_torque
     assert whole == pytest.approx(pushed, rel=1e-7, abs=1e-7 * float(np.max(np.abs(turn))))
     assert float(np.max(np.abs(rates))) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "mode", "ratio"),
+    [("mx64_m6", "position", -60.0), ("mx64_m1", "torque", 60.0), ("mx64_m1", "kinematic", 60.0)],
+)
+def test_steps_with_spinning_rotors_are_the_twins(
+    core: ct.CDLL, name: str, mode: str, ratio: float
+) -> None:
+    robot, h = with_servo(lopsided(3), name, mode=mode, gear_ratio=ratio, stop_stiffness=50.0), 1e-4
+    robot = changed(robot, solver={"step": h, "method": "rosw3"})
+    body, command = random_bodies(robot, 5), random_command(robot, 5)
+    plant, state = Plant(core, robot), start_state(robot, body)
+    plant.bodies = body
+    ours = plant.accelerations(command)
+    dense = accelerations(robot, body, command, standing_damping(robot, body))
+    assert distance(ours.dv, dense.dv) < SAME
+    assert distance(ours.multipliers, dense.multipliers) < SAME
+    assert distance(ours.drive_torque, dense.drive_torque) < SAME
+    for k in (1, 2):
+        start = Start(robot, command, state)
+        state = end_step(start, h, try_step(start, h))
+        plant.step(k * h, command)
+        assert distance(plant.bodies, state.body) < TWIN
+        kinetic = plant.output(command).energy.kinetic
+        assert kinetic == pytest.approx(kinetic_energy(robot, state.body), rel=TWIN)

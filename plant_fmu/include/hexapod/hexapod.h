@@ -96,7 +96,7 @@ typedef struct hxOutput {
   } imu;
   struct {
     double kinetic;        /* J  bodies and rotors */
-    double potential;      /* J  gravity and the elastic parts of contacts, stops and gears */
+    double potential;      /* J  gravity and the elastic parts of contacts and stops */
     double actuator_work;  /* J  by the motors on the joints */
     double push_work;      /* J  by push_force and push_torque */
     double dissipated;     /* J  in contact, friction (with bristles' energy) and gears */
@@ -121,9 +121,7 @@ typedef struct hxOutput {
   double housing_temperature[HX_LEGS][HX_JOINTS]; /* K */
   double remaining_rating[HX_LEGS][HX_JOINTS]; /* 1  of the winding's rise over the air, 0 to 1 */
   double supply_voltage; /* V  of all servos, under the currents at the start of the last call */
-  double gear_deflection[HX_LEGS][HX_JOINTS]; /* rad    rotor less link; 0 of a rigid gear */
-  double motor_speed[HX_LEGS][HX_JOINTS];     /* rad/s  of the rotor, seen at the joint */
-  hxIndicators depth; /* m  of all contacts, < 0: clearance; -1 where the robot has none */
+  hxIndicators depth;    /* m  of all contacts, < 0: clearance; -1 where the robot has none */
 } hxOutput;
 
 enum { HX_FOOTPRINTS = 512 }; /* footprints that a plant keeps; older ones are forgotten */
@@ -165,9 +163,9 @@ HX_API size_t hx_input_ranges(const hxRange **range);
  * was got and what was expected. */
 HX_API hxStatus hx_definition_check(const hxDefinition *definition, char *message);
 
-/* Returns HX_OK if hxCoordinates are the whole state of the robot. With elastic gears they are not:
- * model exchange and derivatives are then refused with HX_INVALID_ARGUMENT and a message as above.
- */
+/* Returns HX_OK if hxCoordinates are the whole state of the robot. With a firmware that has a
+ * memory they are not: model exchange and derivatives are then refused with HX_INVALID_ARGUMENT and
+ * a message as above. */
 HX_API hxStatus hx_definition_check_coordinates(const hxDefinition *definition, char *message);
 
 /* Allocates a plant with the default robot in its initial state; NULL when out of memory. */
@@ -281,7 +279,7 @@ HX_API int hx_plant_update_locks(hxPlant *plant, const hxInput *input);
 /* Computes derivatives of rates and outputs along a direction of input and coordinates, with
  * contacts held. They are exact to rounding (complex step, lanes/complex_step.h); contact flags
  * and the solver's counters have derivative 0. Changes and results may be NULL. Returns
- * HX_INVALID_ARGUMENT where the compiler has no complex numbers (MSVC), and with elastic gears. */
+ * HX_INVALID_ARGUMENT where the compiler has no complex numbers (MSVC). */
 HX_API hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input,
                                  const hxCoordinates *dx, hxCoordinates *d_rate,
                                  hxOutput *d_output);

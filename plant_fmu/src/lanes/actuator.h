@@ -138,56 +138,6 @@ static inline hxReal hx_electrical_power(const hxModel *model, hxReal torque, hx
              : hx_splat(0.0);
 }
 
-/* An elastic gear (eq. 54, 55). */
-typedef struct {
-  hxReal torque;    /* N m        on the link; minus it on the rotor */
-  hxReal lost;      /* W          in its damper */
-  hxReal stiffness; /* N m/rad    d torque/d deflection */
-  hxReal damping;   /* N m s/rad  d torque/d its rate */
-} hxGear;
-
-/* Deflection of the teeth of a gear: that of the gear less its play (eq. 55). */
-typedef struct {
-  hxReal size;   /* rad  its magnitude */
-  hxReal share;  /* 1    its derivative by the deflection: 0 in the play, 1 where teeth engage */
-  hxReal square; /* rad2  twice the integral of the size over the deflection */
-} hxTeeth;
-
-/* Returns these at a deflection. The edges of the play are rounded by a parabola. */
-static inline hxTeeth hx_teeth(const hxModel *model, hxReal deflection) {
-  const hxReal one = hx_splat(1.0), size = hx_abs(deflection);
-  if (model->elastic == 1) return (hxTeeth){size, one, size * size};
-  const hxNumber edge = model->tooth_edge;
-  const hxReal past = size - model->half_play;
-  const hxReal share = hx_clip((past + edge) * (0.5 / edge), hx_splat(0.0), one);
-  const hxMask engaged = hx_less(hx_splat(edge), past);
-  return (hxTeeth){
-      hx_select(engaged, past, edge * (share * share)),
-      share,
-      hx_select(engaged, past * past + edge * edge * (1.0 / 3.0),
-                (4.0 / 3.0) * edge * edge * (share * share * share)),
-  };
-}
-
-/* Returns the energy that an elastic gear stores, J. */
-static inline hxReal hx_gear_energy(const hxModel *model, hxReal deflection) {
-  return (0.5 * model->gear_stiffness) * hx_teeth(model, deflection).square;
-}
-
-/* Returns the torque of an elastic gear and its derivatives; its damper's without the change of
- * the share. */
-static inline hxGear hx_gear_torque(const hxModel *model, hxReal deflection, hxReal rate) {
-  const hxTeeth teeth = hx_teeth(model, deflection);
-  const hxReal spring = model->gear_stiffness * teeth.size;
-  const hxReal damping = model->gear_damping * teeth.share;
-  return (hxGear){
-      .torque = hx_select(hx_less(deflection, hx_splat(0.0)), -spring, spring) + damping * rate,
-      .lost = damping * (rate * rate),
-      .stiffness = model->gear_stiffness * teeth.share,
-      .damping = damping,
-  };
-}
-
 static const double half_turn = 3.14159265358979323846;
 
 /* Returns the angle in [-pi, pi], of an angle at most one turn outside. */

@@ -23,12 +23,9 @@ static inline hxRigid6 link_inertia(const hxModel *model, const hxJointWork *k, 
   return hx_rigid_inertia(hx_load(&model->joint[joint].mass[slot]), k->J, k->c);
 }
 
-/* Adds the coupling of a rotor and its parent to U, and to the inertia that is passed (eq. 58). */
-HX_RARE void couple_rotor(hxSweep *sweep, hxInertia6 *I) {
-  const hxVec3 s = sweep->S.ang;
-  const hxForce6 turn = {s, hx_zero3()};
-  hx_inertia_downdate(I, sweep->carried, turn);
-  sweep->U.ang = hx_add_scaled(sweep->U.ang, sweep->coupling, s);
+/* Adds the coupling of a rotor and its parent to U (eq. 58). */
+HX_RARE void couple_rotor(const hxModel *model, hxSweep *sweep) {
+  sweep->U.ang = hx_add_scaled(sweep->U.ang, hx_splat(model->spin_inertia), sweep->S.ang);
 }
 
 /* Adds the link's own inertia, computes U = I S, and passes I - U U^T/d to the parent. */
@@ -37,7 +34,7 @@ static inline void sweep_sum(const hxModel *model, const hxRigid6 *own, hxReal r
   hx_inertia_add_rigid(I, own);
   sweep->U = hx_inertia_mul(I, sweep->S);
   sweep->inverse_d = sweep_inverse(model, sweep, resists);
-  if (model->spin) couple_rotor(sweep, I);
+  if (model->spin) couple_rotor(model, sweep);
   hx_inertia_downdate(I, sweep->inverse_d, sweep->U);
 }
 
@@ -59,7 +56,7 @@ static inline void sweep_inertia(const hxModel *model, const hxImplicit *implici
   hxJointWork *k = &leg->joint[joint];
   hxSweep *sweep = &k->sweep;
   const hxRigid6 own = link_inertia(model, k, joint, pack * HX_LANES);
-  hxReal resists = model->elastic ? k->rotor.resists : hx_splat(model->rotor_inertia);
+  hxReal resists = hx_splat(model->rotor_inertia);
   if (implicit) {
     const double z = implicit->z;
     resists += z * joint_damping(model, implicit, pack, joint) +
@@ -90,22 +87,16 @@ static inline void sweep_force(const hxModel *model, hxJointWork *k, hxForce6 *p
 }
 
 /* Computes the acceleration of a rotor from those of its joint and of the body that carries it. */
-HX_RARE void rotor_motion(const hxModel *model, hxReal qdd, const hxMotion6 *a, hxJointWork *k) {
-  hxRotorWork *r = &k->rotor;
-  hxReal drive = r->drive + r->impedance * qdd;
-  if (model->spin) {
-    const hxReal turn = hx_dot(k->sweep.S.ang, a->ang);
-    drive -= model->spin_inertia * turn;
-    r->turn += turn;
-  }
-  r->acceleration = model->elastic ? r->inverse * drive : qdd + k->driven;
+HX_RARE void rotor_motion(hxReal qdd, const hxMotion6 *a, hxJointWork *k) {
+  k->rotor.turn += hx_dot(k->sweep.S.ang, a->ang);
+  k->rotor.acceleration = qdd + k->driven;
 }
 
 /* Computes qdd = (u - U.a)/d, and passes a + S qdd to the child, without its bias. */
 static inline void sweep_motion(const hxModel *model, hxJointWork *k, hxMotion6 *a) {
   const hxSweep *sweep = &k->sweep;
   const hxReal qdd = sweep->inverse_d * (sweep->u - hx_power(sweep->U, *a));
-  if (model->elastic || model->spin) rotor_motion(model, qdd, a, k);
+  if (model->spin) rotor_motion(qdd, a, k);
   *a = hx_motion_add_scaled(*a, qdd, sweep->S);
   k->qdd = qdd + k->driven;
   const hxMotion6 felt = hx_motion_add(*a, k->bias);
@@ -143,7 +134,7 @@ static inline void leg_multipliers(const hxModel *model, const hxImplicit *impli
     if (model->spin && joint > 0) {
       const hxVec3 turned = hx_cross(leg->joint[joint - 1].body.w, kin->s);
       const hxVec3 change =
-          hx_add3(hx_scale(k->rotor.acceleration, kin->s), hx_scale(k->motor_speed, turned));
+          hx_add3(hx_scale(k->rotor.acceleration, kin->s), hx_scale(k->speed, turned));
       handed.ang = hx_add_scaled(handed.ang, hx_splat(-model->spin_inertia), change);
     }
   }
@@ -280,21 +271,6 @@ static inline void store_bristle_rates(const hxModel *model, const hxContactStat
   for (int i = 0; i < 3 && HX_PACKS * HX_LANES < HX_SLOTS; ++i) hx_fill_slots(rate->bristle[i]);
 }
 
-/* Stores the rates of elastic gears and their rotors. */
-HX_RARE void store_gear_rates(const hxImplicit *implicit, const hxWork *work, hxPlantMotion *rate) {
-  for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    for (int pack = 0; pack < HX_PACKS; ++pack) {
-      const hxJointWork *k = &work->pack[pack].joint[joint];
-      hxReal moved = k->rotor.rate;
-      if (implicit) moved += implicit->z * (k->rotor.acceleration - k->qdd);
-      hx_store(&rate->deflection[joint][pack * HX_LANES], moved);
-      hx_store(&rate->motor_speed[joint][pack * HX_LANES], k->rotor.acceleration);
-    }
-    hx_fill_slots(rate->deflection[joint]);
-    hx_fill_slots(rate->motor_speed[joint]);
-  }
-}
-
 /* Powers that contact damping, friction, and gears with stops of all legs dissipate, W. */
 typedef struct {
   hxNumber contact, friction, gear;
@@ -352,8 +328,7 @@ static inline hxLossPowers hx_loss_powers(const hxModel *model, const hxWork *wo
       friction[pack] += hx_friction_power(model, leg->row[k], &leg->contact[leg->row[k]]);
     }
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      gear[pack] -= leg->joint[joint].servo.friction * leg->joint[joint].motor_speed;
-      if (model->elastic) gear[pack] += leg->joint[joint].rotor.gear.lost;
+      gear[pack] -= leg->joint[joint].servo.friction * leg->joint[joint].speed;
       if (model->stops) gear[pack] += leg->joint[joint].stop.damped * leg->joint[joint].speed;
     }
   }
@@ -374,8 +349,7 @@ static inline void store_powers(const hxModel *model, const hxCommand *command,
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const hxJointWork *joint = work->pack[pack].joint;
     actuator[pack] = hx_splat(0.0);
-    for (int k = 0; k < HX_JOINTS; ++k)
-      actuator[pack] += joint[k].servo.torque * joint[k].motor_speed;
+    for (int k = 0; k < HX_JOINTS; ++k) actuator[pack] += joint[k].servo.torque * joint[k].speed;
   }
   rate->actuator_work = hx_lane(hx_sum_legs(actuator), 0);
   rate->dissipated = (losses.contact + losses.friction) + losses.gear;
@@ -395,7 +369,6 @@ typedef struct {
   hxVec3 torso[HX_TORSO_PACKS];            /* N s    ground on the torso's points */
   hxReal stop[HX_JOINTS][HX_PACKS];        /* N m s  stops on the joints */
   hxVec3 moment[HX_FOOT_ROWS][HX_PACKS];   /* N m s  spin and rolling friction on tibias */
-  hxReal spring[HX_JOINTS][HX_PACKS];      /* N m s  elastic gears on the links */
   hxVec3 pair[HX_PAIR_ROWS][HX_PACKS];     /* N s    each leg's next leg on it */
 } hxImpulses;
 
@@ -406,7 +379,6 @@ static inline void hx_clear_impulses(const hxModel *model, hxImpulses *sum) {
   if (model->rows > 1) memset(&sum->contact[1], 0, sizeof sum->contact - sizeof sum->contact[0]);
   if (model->torso_rows) memset(sum->torso, 0, sizeof sum->torso);
   if (model->stops) memset(sum->stop, 0, sizeof sum->stop);
-  if (model->elastic) memset(sum->spring, 0, sizeof sum->spring);
   if (has_turning_friction(model, HX_FOOT)) memset(sum->moment, 0, sizeof sum->moment);
   if (model->pair_rows) memset(sum->pair, 0, sizeof sum->pair);
 }
@@ -423,30 +395,6 @@ HX_RARE void add_stop_impulses(const hxImplicit *implicit, int pack, const hxLeg
                 implicit->slope[pack].stop_damping[joint] * (k->speed_shift + z * k->qdd);
     }
     sum->stop[joint][pack] += w * torque;
-  }
-}
-
-/* Adds a stage's impulses of motor and friction on the rotors of a leg, and of its elastic gears on
- * the links. */
-HX_RARE void add_rotor_impulses(const hxImplicit *implicit, int pack, const hxLegWork *leg,
-                                double weight, hxImpulses *sum) {
-  const hxReal w = hx_splat(weight);
-  for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    const hxJointWork *k = &leg->joint[joint];
-    const hxRotorWork *r = &k->rotor;
-    hxReal motor = k->servo.torque, gear = k->servo.friction;
-    if (implicit) {
-      const double z = implicit->z;
-      const hxReal angle = k->angle_shift + r->shift + (z * z) * r->acceleration,
-                   speed = r->speed_shift + z * r->acceleration;
-      motor -= implicit->slope[pack].motor_stiffness[joint] * angle +
-               implicit->slope[pack].motor_damping[joint] * speed;
-      gear -= implicit->slope[pack].gear_drag[joint] * speed;
-    }
-    sum->motor[joint][pack] += w * motor;
-    sum->gear[joint][pack] += w * gear;
-    sum->spring[joint][pack] +=
-        w * (r->gear.torque + r->give + r->impedance * (r->acceleration - k->qdd));
   }
 }
 
@@ -492,8 +440,7 @@ static inline void hx_add_impulses(const hxModel *model, const hxCommand *comman
   const hxReal w = hx_splat(weight);
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const hxLegWork *leg = &work->pack[pack];
-    if (model->elastic) add_rotor_impulses(implicit, pack, leg, weight, sum);
-    for (int joint = 0; !model->elastic && joint < HX_JOINTS; ++joint) {
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const hxJointWork *k = &leg->joint[joint];
       hxReal motor = k->servo.torque, gear = k->servo.friction;
       if (implicit &&
@@ -539,8 +486,6 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   }
   if (implicit && work->torso_rows) torso_response(model, contact, motion, implicit, work);
 
-  for (int pack = 0; model->elastic && pack < HX_PACKS; ++pack)
-    rotor_response(model, implicit, pack, &work->pack[pack]);
   for (int pack = 0; model->spin && pack < HX_PACKS; ++pack)
     rotor_coupling(model, &work->pack[pack]);
 
@@ -569,7 +514,6 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
                       &work->pack[pack].joint[joint], rate);
   if (has_bristles(model, HX_FOOT))
     store_bristle_rates(model, contact, implicit, work, &rate->motion);
-  if (model->elastic) store_gear_rates(implicit, work, &rate->motion);
   fill_rate_slots(rate);
   if (!implicit)
     store_powers(model, command, motion, work, &rate->motion);

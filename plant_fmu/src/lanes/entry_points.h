@@ -8,14 +8,6 @@
 
 static const double first_step_size = 1e-4; /* s  first step after a reset */
 
-/* Sets rotors behind elastic gears to the speeds of their joints, without deflection. */
-static void start_gears(const hxModel *model, hxState *state) {
-  hx_moment_of(model, &state->contact, &state->motion, &state->moment);
-  memset(state->motion.deflection, 0, sizeof state->motion.deflection);
-  memcpy(state->motion.motor_speed, state->moment.speed, sizeof state->motion.motor_speed);
-  for (int joint = 0; joint < HX_JOINTS; ++joint) hx_fill_slots(state->motion.motor_speed[joint]);
-}
-
 /* The functions of kernel.h's table, which describes them. */
 static void kernel_start(const hxModel *model, double t, hxState *state, void *scratch) {
   static const hxCommand no_command;
@@ -34,7 +26,6 @@ static void kernel_start(const hxModel *model, double t, hxState *state, void *s
   }
   hx_contact_start(model, &depths, &state->contact);
   memset(state->motion.bristle, 0, sizeof state->motion.bristle);
-  if (model->elastic) start_gears(model, state);
   hx_dynamics_forces(model, &state->contact, &no_command, t, &state->motion, NULL, 0, 1, work);
   hx_moment_update(model, state);
   memset(&state->completed, 0, sizeof state->completed);
@@ -204,7 +195,7 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
 static int needs_accelerations(const hxModel *model, unsigned groups) {
   if (groups & HX_OUTPUT_REACTIONS) return 1;
   return (groups & ~(unsigned)HX_OUTPUT_MOTION) &&
-         (model->servo_mode == HX_SERVO_KINEMATIC || model->elastic || model->spin);
+         (model->servo_mode == HX_SERVO_KINEMATIC || model->spin);
 }
 
 static void kernel_output(const hxModel *model, const hxState *state, const hxCommand *command,

@@ -135,27 +135,15 @@ static inline void leg_pass(const hxModel *model, const hxCommand *command, doub
                joint > 0 ? &leg->joint[joint - 1].body : torso, &chain, &leg->joint[joint]);
 }
 
-/* Reads rotor and deflection of an elastic gear, and computes its torque (eq. 54). */
-HX_RARE void elastic_gear(const hxModel *model, const hxPlantMotion *motion, int joint, int slot,
-                          hxJointWork *k) {
-  hxRotorWork *rotor = &k->rotor;
-  k->motor_speed = hx_load(&motion->motor_speed[joint][slot]);
-  rotor->deflection = hx_load(&motion->deflection[joint][slot]);
-  rotor->gear = hx_gear_torque(model, rotor->deflection, k->motor_speed - k->speed);
-}
-
-/* Computes the torques of motor, gear and stops on a joint (eq. 12, 39, 54). */
-static inline void joint_torque(const hxModel *model, const hxCommand *command,
-                                const hxPlantMotion *motion, int joint, int slot, hxJointWork *k) {
-  k->motor_speed = k->speed;
-  if (model->elastic) elastic_gear(model, motion, joint, slot, k);
+/* Computes the torques of motor, gear and stops on a joint (eq. 12, 39). */
+static inline void joint_torque(const hxModel *model, const hxCommand *command, int joint, int slot,
+                                hxJointWork *k) {
   k->servo =
-      hx_servo_torque(model, k->angle, k->motor_speed, hx_load(&command->angle[joint][slot]),
+      hx_servo_torque(model, k->angle, k->speed, hx_load(&command->angle[joint][slot]),
                       hx_load(&command->speed[joint][slot]), hx_load(&command->torque[joint][slot]),
                       hx_power_of(command, joint, slot));
   k->torque = model->servo_mode == HX_SERVO_KINEMATIC ? k->servo.friction
                                                       : k->servo.torque + k->servo.friction;
-  if (model->elastic) k->torque = k->rotor.gear.torque;
   if (model->stops) {
     k->stop = hx_stop_torque(model, joint, slot, k->angle, k->speed);
     k->torque += k->stop.torque;
@@ -168,8 +156,7 @@ HX_RARE void rotor_moments(const hxModel *model, const hxBody *torso, hxLegWork 
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     hxJointWork *k = &leg->joint[joint];
     const hxVec3 w = joint > 0 ? leg->joint[joint - 1].body.w : torso->w;
-    const hxVec3 moment =
-        hx_scale(model->spin_inertia * k->motor_speed, hx_cross(w, k->sweep.S.ang));
+    const hxVec3 moment = hx_scale(model->spin_inertia * k->speed, hx_cross(w, k->sweep.S.ang));
     k->sweep.passed = joint > 0 ? hx_zero3() : moment;
     if (joint > 0) leg->joint[joint - 1].p.ang = hx_add3(leg->joint[joint - 1].p.ang, moment);
   }
@@ -189,8 +176,7 @@ HX_RARE void gear_frictions(const hxModel *model, int slot, hxLegWork *leg) {
     if (model->stops) external += k->stop.torque;
     const int kinematic = model->servo_mode == HX_SERVO_KINEMATIC;
     if (kinematic) k->servo.torque = -external;
-    hx_measured_friction(model, &k->motor_speed, &external, &k->servo);
-    if (model->elastic) continue; /* it acts on the rotor */
+    hx_measured_friction(model, &k->speed, &external, &k->servo);
     k->torque = kinematic ? k->servo.friction : k->servo.torque + k->servo.friction;
     if (model->stops) k->torque += k->stop.torque;
   }
@@ -371,7 +357,7 @@ static inline void hx_dynamics_forces(const hxModel *model, const hxContactState
              &work->pack[pack]);
   for (int joint = 0; joint < HX_JOINTS; ++joint)
     for (int pack = 0; pack < HX_PACKS; ++pack)
-      joint_torque(model, command, motion, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
+      joint_torque(model, command, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
   for (int pack = 0; pack < HX_PACKS; ++pack)
     leg_contacts(model, contact, motion, known, pack * HX_LANES, all, &work->pack[pack]);
   for (int pack = 0; model->spin && pack < HX_PACKS; ++pack)

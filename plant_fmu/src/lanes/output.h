@@ -32,8 +32,8 @@ static hxReal spin_energy(const hxModel *model, const hxBody *torso, const hxLeg
   hxReal energy = hx_splat(0.0);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     const hxVec3 w = joint > 0 ? leg->joint[joint - 1].body.w : torso->w;
-    energy += model->spin_inertia * leg->joint[joint].motor_speed *
-              hx_dot(leg->joint[joint].sweep.S.ang, w);
+    energy +=
+        model->spin_inertia * leg->joint[joint].speed * hx_dot(leg->joint[joint].sweep.S.ang, w);
   }
   return energy;
 }
@@ -50,7 +50,7 @@ static hxNumber hx_kinetic_energy(const hxModel *model, const hxPlantMotion *mot
       const hxJointWork *k = &work->pack[pack].joint[joint];
       const int slot = pack * HX_LANES;
       const hxReal mass = hx_load(&model->joint[joint].mass[slot]);
-      const hxReal rotor = (0.5 * model->rotor_inertia) * k->motor_speed * k->motor_speed;
+      const hxReal rotor = (0.5 * model->rotor_inertia) * k->speed * k->speed;
       legs[pack] +=
           body_kinetic(mass, k->J, hx_link_vec3(motion, joint, HX_V, slot), k->body.w) + rotor;
     }
@@ -107,8 +107,6 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *m
     for (int k = 1; k < model->rows; ++k)
       legs[pack] += ground_energy(model, model->row[k], &contact[model->row[k]]);
     if (model->stops) legs[pack] += stop_energy(model, &work->pack[pack], slot);
-    for (int joint = 0; model->elastic && joint < HX_JOINTS; ++joint)
-      legs[pack] += hx_gear_energy(model, work->pack[pack].joint[joint].rotor.deflection);
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       legs[pack] -= hx_load(&model->joint[joint].mass[slot]) *
                     hx_dot(g, hx_link_vec3(motion, joint, HX_R, slot));
@@ -142,9 +140,7 @@ static void fill_servo(const hxModel *model, const hxState *state, const hxJoint
                        int leg, int joint, hxOutput *o) {
   o->current[leg][joint] = hx_lane(hx_motor_current(model, k->servo.torque), lane);
   o->electrical_power[leg][joint] =
-      hx_lane(hx_electrical_power(model, k->servo.torque, k->motor_speed), lane);
-  o->gear_deflection[leg][joint] = model->elastic ? hx_lane(k->rotor.deflection, lane) : 0.0;
-  o->motor_speed[leg][joint] = hx_lane(k->motor_speed, lane);
+      hx_lane(hx_electrical_power(model, k->servo.torque, k->speed), lane);
   o->positive_work[leg][joint] = state->measured.positive_work[joint][leg];
   o->negative_work[leg][joint] = state->measured.negative_work[joint][leg];
   o->torque_squared[leg][joint] = state->measured.torque_squared[joint][leg];
@@ -437,7 +433,7 @@ static void hx_integral_rates_fill(const hxModel *model, const hxContactState *s
     const hxLegWork *w = leg_work(work, leg, &lane);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const double torque = hx_lane(w->joint[joint].servo.torque, lane),
-                   power = torque * hx_lane(w->joint[joint].motor_speed, lane);
+                   power = torque * hx_lane(w->joint[joint].speed, lane);
       rate->positive_work[leg][joint] = fmax(power, 0.0);
       rate->negative_work[leg][joint] = fmax(-power, 0.0);
       rate->torque_squared[leg][joint] = torque * torque;

@@ -68,20 +68,6 @@ HX_RARE void keep_further_slopes(const hxModel *model, const hxContactState *sta
     keep_contact_slope(model, state, pack, leg->row[k], leg, implicit);
 }
 
-/* Stores those of elastic gears: the larger one of now and a step ahead, because teeth that are
- * about to meet have none yet. */
-HX_RARE void keep_gear_slopes(const hxModel *model, int pack, const hxLegWork *leg,
-                              hxImplicit *implicit) {
-  for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    const hxJointWork *k = &leg->joint[joint];
-    const hxReal rate = k->motor_speed - k->speed;
-    const hxGear ahead =
-        hx_gear_torque(model, k->rotor.deflection + implicit->ahead * rate, hx_splat(0.0));
-    implicit->slope[pack].gear_stiffness[joint] = hx_max(k->rotor.gear.stiffness, ahead.stiffness);
-    implicit->slope[pack].gear_damping[joint] = hx_max(k->rotor.gear.damping, ahead.damping);
-  }
-}
-
 /* Stores the derivatives of a leg's forces for all stages of a step. */
 static inline void keep_slopes(const hxModel *model, const hxContactState *state, int pack,
                                const hxLegWork *leg, hxImplicit *implicit) {
@@ -96,24 +82,20 @@ static inline void keep_slopes(const hxModel *model, const hxContactState *state
       implicit->slope[pack].stop_damping[joint] = leg->joint[joint].stop.damping;
     }
   }
-  if (model->elastic) keep_gear_slopes(model, pack, leg, implicit);
 }
 
-/* Returns the damping of motor, gear and stop together, N m s/rad; of the stop alone where an
- * elastic gear lies between. */
+/* Returns the damping of motor, gear and stop together, N m s/rad. */
 static inline hxReal joint_damping(const hxModel *model, const hxImplicit *implicit, int pack,
                                    int joint) {
-  const hxReal servo = model->elastic ? hx_splat(0.0)
-                                      : implicit->slope[pack].motor_damping[joint] +
-                                            implicit->slope[pack].gear_drag[joint];
+  const hxReal servo =
+      implicit->slope[pack].motor_damping[joint] + implicit->slope[pack].gear_drag[joint];
   return model->stops ? servo + implicit->slope[pack].stop_damping[joint] : servo;
 }
 
-/* Returns the stiffness of motor and stop together, N m/rad; likewise. */
+/* Returns the stiffness of motor and stop together, N m/rad. */
 static inline hxReal joint_stiffness(const hxModel *model, const hxImplicit *implicit, int pack,
                                      int joint) {
-  const hxReal servo =
-      model->elastic ? hx_splat(0.0) : implicit->slope[pack].motor_stiffness[joint];
+  const hxReal servo = implicit->slope[pack].motor_stiffness[joint];
   return model->stops ? servo + implicit->slope[pack].stop_stiffness[joint] : servo;
 }
 
@@ -226,69 +208,15 @@ static inline void leg_response(const hxModel *model, const hxImplicit *implicit
   tibia_response(model, implicit, pack, &j, leg);
 }
 
-/* Adds the response of an elastic gear's joint in a linearly implicit stage. */
-static inline void gear_response(const hxImplicit *implicit, int pack, int joint, hxReal *inertia,
-                                 hxJointWork *k) {
-  hxRotorWork *r = &k->rotor;
-  const int slot = pack * HX_LANES;
-  const double z = implicit->z;
-  const hxReal motor = implicit->slope[pack].motor_stiffness[joint],
-               damping = implicit->slope[pack].motor_damping[joint] +
-                         implicit->slope[pack].gear_drag[joint],
-               spring = implicit->slope[pack].gear_stiffness[joint],
-               damper = implicit->slope[pack].gear_damping[joint];
-  hxReal moved = hx_splat(0.0);
-  if (implicit->change) {
-    moved = hx_load(&implicit->change->motion.deflection[joint][slot]);
-    r->speed_shift = hx_load(&implicit->change->motion.motor_speed[joint][slot]);
-  }
-  const hxReal faster = r->speed_shift - k->speed_shift;
-  r->rate += faster;
-  r->shift = moved + z * r->rate;
-  r->give = spring * r->shift + damper * faster;
-  r->drive -= r->give + motor * (k->angle_shift + r->shift) + damping * r->speed_shift;
-  r->impedance = z * damper + (z * z) * spring;
-  *inertia += z * damping + (z * z) * motor;
-}
-
-/* Eliminates the rotors behind the elastic gears of a leg from a stage (eq. 56): what is left are a
- * torque on the joint and an inertia that resists its acceleration. */
-HX_RARE void rotor_response(const hxModel *model, const hxImplicit *implicit, int pack,
-                            hxLegWork *leg) {
-  for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    hxJointWork *k = &leg->joint[joint];
-    hxRotorWork *r = &k->rotor;
-    hxReal inertia = hx_splat(model->rotor_inertia);
-    r->rate = k->motor_speed - k->speed;
-    r->impedance = r->give = r->shift = r->speed_shift = hx_splat(0.0);
-    r->drive = k->servo.torque + k->servo.friction - r->gear.torque;
-    if (implicit) gear_response(implicit, pack, joint, &inertia, k);
-    r->inverse = 1.0 / (inertia + r->impedance);
-    r->resists = r->impedance * (inertia * r->inverse);
-    k->torque += r->give + (r->impedance * r->inverse) * r->drive;
-  }
-}
-
-/* Sets how the rotors' angular momenta couple joints and the bodies that carry them (eq. 58). */
+/* Adds to joints and the bodies that carry them what the rotors' angular momenta need (eq. 58). */
 HX_RARE void rotor_coupling(const hxModel *model, hxLegWork *leg) {
   const hxNumber spin = model->spin_inertia;
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     hxJointWork *k = &leg->joint[joint];
-    hxRotorWork *r = &k->rotor;
     const hxVec3 s = k->sweep.S.ang;
-    r->turn = joint > 0 ? hx_dot(s, leg->joint[joint - 1].bias.ang) : hx_splat(0.0);
-    hxReal moved = k->driven;
-    k->sweep.coupling = hx_splat(spin), k->sweep.carried = hx_splat(0.0);
-    if (model->elastic) {
-      const hxReal share = r->impedance * r->inverse;
-      r->drive -= spin * r->turn;
-      moved = r->inverse * r->drive;
-      k->torque -= share * (spin * r->turn);
-      k->sweep.coupling = share * spin, k->sweep.carried = (spin * spin) * r->inverse;
-    } else {
-      k->torque -= spin * r->turn;
-    }
-    k->sweep.passed = hx_add_scaled(k->sweep.passed, spin * moved, s);
+    k->rotor.turn = joint > 0 ? hx_dot(s, leg->joint[joint - 1].bias.ang) : hx_splat(0.0);
+    k->torque -= spin * k->rotor.turn;
+    k->sweep.passed = hx_add_scaled(k->sweep.passed, spin * k->driven, s);
   }
 }
 

@@ -9,8 +9,7 @@
 
 /* Scales of the error norm (eq. 22): 0.1 m, 1 (quaternion), 1 m/s and 10 rad/s. */
 static const double error_scale[HX_BODY_STATE] = {0.1, 0.1, 0.1, 1, 1, 1, 1, 1, 1, 1, 10, 10, 10};
-static const double bristle_scale = 10.0;                       /* 1  in preslidings */
-static const double deflection_scale = 0.1, motor_scale = 10.0; /* rad, rad/s  of elastic gears */
+static const double bristle_scale = 10.0; /* 1  in preslidings */
 
 typedef struct {
   hxPlantMotion y;
@@ -85,12 +84,12 @@ HX_INLINE void stage_entries(const hxPlantMotion *from, const hxReal *w_y, const
 
 /* Computes the arguments of a stage, y = y_0 + h sum a_j k_j, and for a linearly implicit method
  * change = h sum g_j k_j (g NULL: none), in one pass over n rates. n is a constant for the
- * compiler. Bristles and elastic gears only where the model has them. */
+ * compiler. Bristles only where the model has them. */
 HX_INLINE void stage_of_n(const hxModel *model, const hxPlantMotion *from, double h,
                           const double *a, const double *g, const hxRate *k, int n,
                           hxPlantMotion *y, hxRate *change) {
-  enum { BRISTLES = HX_TURN_SIZE + HX_BODIES_SIZE, GEARS = BRISTLES + HX_BRISTLE_SIZE };
-  const int end = has_bristles(model, HX_FOOT) ? GEARS : BRISTLES;
+  enum { BRISTLES = HX_TURN_SIZE + HX_BODIES_SIZE };
+  const int end = has_bristles(model, HX_FOOT) ? BRISTLES + HX_BRISTLE_SIZE : BRISTLES;
   hxReal w_y[HX_STAGES], weights[HX_STAGES];
   const hxReal *w_change = g ? weights : NULL;
   weights_of(w_y, h, a, n);
@@ -98,8 +97,6 @@ HX_INLINE void stage_of_n(const hxModel *model, const hxPlantMotion *from, doubl
   for (int i = 0; g && i < HX_TURN_SIZE; i += HX_LANES)
     hx_store(&change->y[i], combined(hx_splat(0.0), weights, k, n, i));
   stage_entries(from, w_y, w_change, k, n, HX_TURN_SIZE, end, y, change);
-  if (model->elastic)
-    stage_entries(from, w_y, w_change, k, n, GEARS, GEARS + HX_GEAR_SIZE, y, change);
 }
 
 /* Calls stage_of_n with n as a constant. */
@@ -160,13 +157,15 @@ HX_INLINE void end_of_bodies(const hxPlantMotion *from, const hxReal *b, const h
       }
 }
 
-/* Computes the same of `size` entries from `first` on, whose errors have one scale. Where they do
- * not move, because the model has no law for them, they stay. */
-HX_INLINE void end_of_entries(const hxPlantMotion *from, const hxReal *b, const hxReal *e, int n,
-                              int estimates, const hxRate *k, int first, int size, int move,
-                              double scale, hxPlantMotion *y, hxStepEnd *found) {
-  for (int i = 0; i < size; i += HX_LANES) {
-    const int at = first + i;
+/* Computes the same of the bristles. Where they do not move, because the model has no law for them,
+ * they stay. */
+HX_INLINE void end_of_bristles(const hxModel *model, const hxPlantMotion *from, const hxReal *b,
+                               const hxReal *e, int n, int estimates, const hxRate *k,
+                               hxPlantMotion *y, hxStepEnd *found) {
+  const int move = has_bristles(model, HX_FOOT);
+  const double scale = bristle_scale * model->bristle_length;
+  for (int i = 0; i < HX_BRISTLE_SIZE; i += HX_LANES) {
+    const int at = HX_BODIES_SIZE + i;
     hxReal end = hx_load(&from->y[at]);
     if (move) end = combined(end, b, k, n, HX_TURN_SIZE + at);
     hx_store(&y->y[at], end);
@@ -182,22 +181,12 @@ HX_INLINE void end_of_entries(const hxPlantMotion *from, const hxReal *b, const 
 HX_INLINE hxStepEnd step_of_n(const hxModel *model, const hxPlantMotion *from, double h,
                               const hxMethodRow *m, int n, int estimates, const hxRate *k,
                               hxPlantMotion *y) {
-  enum {
-    BRISTLES = HX_BODIES_SIZE,
-    DEFLECTIONS = BRISTLES + HX_BRISTLE_SIZE,
-    SPEEDS = DEFLECTIONS + HX_GEAR_SIZE / 2
-  };
   hxStepEnd found = {hx_splat(0.0), hx_splat(0.0), 0.0};
   hxReal b[HX_STAGES], e[HX_STAGES];
   weights_of(b, h, m->b, n);
   weights_of(e, h, m->e, n);
   end_of_bodies(from, b, e, n, estimates, k, y, &found);
-  end_of_entries(from, b, e, n, estimates, k, BRISTLES, HX_BRISTLE_SIZE,
-                 has_bristles(model, HX_FOOT), bristle_scale * model->bristle_length, y, &found);
-  end_of_entries(from, b, e, n, estimates, k, DEFLECTIONS, HX_GEAR_SIZE / 2, model->elastic,
-                 deflection_scale, y, &found);
-  end_of_entries(from, b, e, n, estimates, k, SPEEDS, HX_GEAR_SIZE / 2, model->elastic, motor_scale,
-                 y, &found);
+  end_of_bristles(model, from, b, e, n, estimates, k, y, &found);
   return found;
 }
 

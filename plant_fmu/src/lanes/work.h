@@ -13,26 +13,8 @@ typedef struct {
   hxForce6 U;       /* I S, with I the articulated inertia of the child and all it carries */
   hxReal inverse_d; /* 1/d; 0 for a kinematic drive */
   hxReal u;         /* torque - S.p */
-  /* set if the rotors have angular momentum (eq. 58) */
-  hxReal coupling, carried; /* kg m2  of link and parent, of the parent itself, by the rotor */
-  hxVec3 passed;            /* N m    torque that the rotor's motion needs of the parent */
+  hxVec3 passed; /* N m  torque that the rotor's motion needs of the parent (eq. 58): with spin */
 } hxSweep;
-
-/* The rotor behind an elastic gear. A stage eliminates its acceleration m and the rate of the
- * deflection: m = (drive + impedance qdd) inverse, the gear's torque on the link is that of hxGear
- * + give + impedance (m - qdd) (eq. 56). An explicit stage has the impedance 0. */
-typedef struct {
-  hxGear gear;
-  hxReal deflection;         /* rad */
-  hxReal drive;              /* N m    torque on the rotor at the end of the stage without m, qdd */
-  hxReal impedance, inverse; /* kg m2, 1/(kg m2) */
-  hxReal resists;            /* kg m2  of the joint, by the rotor behind the gear */
-  hxReal give;               /* N m    response of the gear's torque to the shifts */
-  hxReal shift, speed_shift; /* rad, rad/s  of the deflection and of the rotor, without m and qdd */
-  hxReal rate;               /* rad/s  of the deflection, without m and qdd */
-  hxReal acceleration;       /* rad/s2 m */
-  hxReal turn;               /* rad/s2  the parent's acceleration about the axis; set with spin */
-} hxRotorWork;
 
 /* A joint and its child. */
 typedef struct {
@@ -41,7 +23,6 @@ typedef struct {
   hxSym3 J;            /* child's inertia, world axes, about its centre of mass */
   hxVec3 gyroscopic;   /* -w x (J w) */
   hxReal angle, speed; /* rad, rad/s */
-  hxReal motor_speed;  /* rad/s  of the rotor, seen at the joint; of a rigid gear the joint's */
   hxReal torque;       /* N m  servo, gear and stop (kinematic mode: gear and drive) */
   hxReal driven;       /* rad/s2  acceleration of the drive in kinematic mode, else 0 */
   hxServo servo;
@@ -52,8 +33,10 @@ typedef struct {
   hxReal qdd;
   hxReal angle_shift, speed_shift; /* rad, rad/s  of eq. 20, without qdd's part */
   hxMotion6 acceleration;          /* a - g of the child at its centre of mass */
-  hxRotorWork rotor;               /* set if the gears are elastic or the rotors spin */
-  struct {                         /* computed for the multipliers on request */
+  struct {                         /* set if the rotors spin */
+    hxReal turn, acceleration;     /* rad/s2  the parent's about the axis, and the rotor's */
+  } rotor;
+  struct { /* computed for the multipliers on request */
     hxJointKinematics kin;
     hxVec3 lambda_lin; /* rows 1-3 */
     hxReal lambda[2];  /* rows 4, 5 */
@@ -114,7 +97,6 @@ typedef struct {
     hxReal motor_stiffness[HX_JOINTS], motor_damping[HX_JOINTS], gear_drag[HX_JOINTS];
     hxContactSlope contact[HX_TIBIA_ROWS];
     hxReal stop_stiffness[HX_JOINTS], stop_damping[HX_JOINTS]; /* set if the model has stops */
-    hxReal gear_stiffness[HX_JOINTS], gear_damping[HX_JOINTS]; /* set if its gears are elastic */
   } slope[HX_PACKS];
   hxContactSlope torso_slope[HX_TORSO_PACKS];
 } hxImplicit;

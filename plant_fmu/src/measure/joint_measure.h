@@ -23,17 +23,6 @@ static inline void warm_servo(const hxPath *path, int joint, int slot, hxReal co
   hx_store(&measured->housing[joint][slot], 2.0 * mean_housing - housing);
 }
 
-/* Returns how fast a rotor behind an elastic gear turns at x in [0, 1], rad per step; rise: of the
- * joint's angle. */
-HX_RARE hxReal motor_rate(const hxPath *path, int joint, int slot, hxReal rise, double x) {
-  const hxReal h = hx_splat(path->h);
-  const hxReal deflected =
-      hx_load(&path->to->deflection[joint][slot]) - hx_load(&path->from->deflection[joint][slot]);
-  return cubic(hx_splat(0.0), h * hx_load(&path->from->motor_speed[joint][slot]), rise + deflected,
-               h * hx_load(&path->to->motor_speed[joint][slot]), hx_splat(x))
-      .rate;
-}
-
 /* Measures one joint: positive and negative work, whose difference is the step's work, and the
  * integral of the squared torque, which it returns, N2 m2 s. */
 static inline hxReal measure_joint(const hxPath *path, int joint, int slot, hxReal work,
@@ -48,9 +37,7 @@ static inline hxReal measure_joint(const hxPath *path, int joint, int slot, hxRe
   for (int node = 0; node <= INTERVALS; node += MOTOR_STRIDE) {
     const hxCommand *command = path->command[node];
     const hxCubic q = cubic(angle, slope_from, rise, slope_to, hx_splat((double)node / INTERVALS));
-    const hxReal speed =
-        per_step *
-        (model->elastic ? motor_rate(path, joint, slot, rise, (double)node / INTERVALS) : q.rate);
+    const hxReal speed = per_step * q.rate;
     const hxReal weight = hx_splat(path->h * motor_weight[node]);
     hxReal torque = mean_torque; /* a kinematic drive has no torque law */
     if (model->servo_mode != HX_SERVO_KINEMATIC)
@@ -86,7 +73,7 @@ HX_RARE void warm_servos(const hxPath *path, int pack, const hxImpulses *impulse
   const double per_square = model->resistance / (model->torque_constant * model->torque_constant);
   const int slot = pack * HX_LANES;
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    const hxReal speed = mean_motor_speed(path, joint, slot);
+    const hxReal speed = mean_speed(path, joint, slot);
     const hxReal gear = -impulse->gear[joint][pack] * speed;
     warm_servo(path, joint, slot, per_square * squared[joint], gear, measured);
   }

@@ -163,10 +163,6 @@ static inline double hx_moment_and_bound(const hxModel *model, const hxModel *wh
   if (model->pair_rows) hx_pair_moments(model, motion, moment);
   if (whole && whole->pair_rows) bound = hx_max(bound, hx_deepest_pair(whole, motion));
   moment->stale = 0.0;
-  if (model->elastic) {
-    memcpy(moment->deflection, motion->deflection, sizeof moment->deflection);
-    memcpy(moment->motor_speed, motion->motor_speed, sizeof moment->motor_speed);
-  }
   return hx_largest_lane(bound);
 }
 
@@ -181,7 +177,6 @@ static inline void hx_copy_moment(const hxModel *model, hxMoment *to, const hxMo
   memcpy(to, from, offsetof(hxMoment, contact[1]));
   for (int k = 1; k < model->listed; ++k) to->contact[model->row[k]] = from->contact[model->row[k]];
   if (model->foot_rows > 1) memcpy(to->share, from->share, sizeof to->share);
-  if (model->elastic) hx_copy_gears(to, from);
 }
 
 /* Returns whether a foot off its block would be deeper in the faces around another cell. */

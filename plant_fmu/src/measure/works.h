@@ -115,40 +115,23 @@ HX_RARE void add_pair_works(const hxPath *path, const hxImpulses *impulse, hxSte
     }
 }
 
+/* Returns the mean of a joint's speeds at both ends, rad/s. */
+static inline hxReal mean_speed(const hxPath *path, int joint, int slot) {
+  return mean_of(&path->from->speed[joint][slot], &path->to->speed[joint][slot]);
+}
+
 /* Adds what the stops of a pack of legs lose in a step: their work on the joints less what they
  * store. */
 HX_RARE void add_stop_works(const hxPath *path, const hxImpulses *impulse, int pack,
                             hxStepWorks *works) {
   const int slot = pack * HX_LANES;
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    const hxReal speed = mean_of(&path->from->speed[joint][slot], &path->to->speed[joint][slot]);
+    const hxReal speed = mean_speed(path, joint, slot);
     const hxReal before = hx_load(&path->from->angle[joint][slot]),
                  after = hx_load(&path->to->angle[joint][slot]);
     const hxReal stored = hx_stop_energy(path->model, joint, slot, after) -
                           hx_stop_energy(path->model, joint, slot, before);
     works->gear[pack] -= impulse->stop[joint][pack] * speed + stored;
-  }
-}
-
-/* Returns the mean of the rotor's speeds at both ends, which with a rigid gear are the joint's. */
-static inline hxReal mean_motor_speed(const hxPath *path, int joint, int slot) {
-  return path->model->elastic
-             ? mean_of(&path->from->motor_speed[joint][slot], &path->to->motor_speed[joint][slot])
-             : mean_of(&path->from->speed[joint][slot], &path->to->speed[joint][slot]);
-}
-
-/* Adds what the dampers of the elastic gears of a pack of legs lose in a step: the work on the
- * gears less what they store. */
-HX_RARE void add_spring_works(const hxPath *path, const hxImpulses *impulse, int pack,
-                              hxStepWorks *works) {
-  const int slot = pack * HX_LANES;
-  for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    const hxReal faster = mean_motor_speed(path, joint, slot) -
-                          mean_of(&path->from->speed[joint][slot], &path->to->speed[joint][slot]);
-    const hxReal before = hx_load(&path->from->deflection[joint][slot]),
-                 after = hx_load(&path->to->deflection[joint][slot]);
-    const hxReal stored = hx_gear_energy(path->model, after) - hx_gear_energy(path->model, before);
-    works->gear[pack] += impulse->spring[joint][pack] * faster - stored;
   }
 }
 
@@ -168,7 +151,7 @@ static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
     const int slot = pack * HX_LANES;
     works->gear[pack] = hx_splat(0.0);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      const hxReal speed = mean_motor_speed(path, joint, slot);
+      const hxReal speed = mean_speed(path, joint, slot);
       works->motor[joint][pack] = impulse->motor[joint][pack] * speed;
       works->mean_torque[joint][pack] = impulse->motor[joint][pack] * per_step;
       works->gear[pack] -= impulse->gear[joint][pack] * speed;
@@ -177,7 +160,6 @@ static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
                   &works->friction[pack]);
     if (path->model->rows > 1) add_further_works(path, pack, impulse, works);
     if (path->model->stops) add_stop_works(path, impulse, pack, works);
-    if (path->model->elastic) add_spring_works(path, impulse, pack, works);
     if (has_turning_friction(path->model, HX_FOOT)) add_turning_works(path, impulse, pack, works);
   }
   works->torso_contact = works->torso_friction = 0.0;

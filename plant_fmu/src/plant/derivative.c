@@ -97,7 +97,6 @@ hxStatus hx_plant_tangent_by(hxPlant *plant, const hxInput *input,
   static const hxCoordinates no_change;
   double scale =
       hx_largest(hx_largest(0.0, d_input, sizeof *d_input / sizeof(double)), dx, HX_COORDINATES);
-  if (plant->model.elastic) return hx_refuse_elastic_gears(plant->message);
   if (!isfinite(scale))
     return hx_plant_fail(
         plant, HX_INVALID_ARGUMENT,

@@ -123,19 +123,6 @@ static void compile_servo(hxModel *model, const hxDefinition *d) {
   model->stops = d->servo.mode != HX_SERVO_KINEMATIC && d->servo.stop_stiffness > 0.0;
 }
 
-/* Copies the constants of elastic gears and of the rotors' angular momentum (eq. 54-57). Kinematic
- * drives move their joints themselves: their gears are rigid. */
-static void compile_rotor(hxModel *model, const hxDefinition *d) {
-  const double edge = 0.1; /* 1  of half of the play: half of the way on which the teeth engage */
-  model->spin = d->servo.gear_ratio != 0.0;
-  if (model->spin) model->spin_inertia = d->servo.rotor_inertia / d->servo.gear_ratio;
-  if (!hx_has_elastic_gears(d)) return;
-  model->elastic = d->servo.backlash > 0.0 ? 2 : 1;
-  model->gear_stiffness = d->servo.gear_stiffness, model->gear_damping = d->servo.gear_damping;
-  model->half_play = 0.5 * d->servo.backlash;
-  model->tooth_edge = edge * model->half_play;
-}
-
 /* Returns whether the gears have Stribeck terms, and in *measured whether they have more than
  * Coulomb friction. */
 static int gear_terms(const hxDefinition *d, int *measured) {
@@ -174,7 +161,8 @@ void hx_laws_compile(hxModel *model, const hxDefinition *d) {
   compile_friction(model, d);
   compile_servo(model, d);
   compile_gear(model, d);
-  compile_rotor(model, d);
+  model->spin = d->servo.gear_ratio != 0.0;
+  if (model->spin) model->spin_inertia = d->servo.rotor_inertia / d->servo.gear_ratio;
   model->terrain_kind = d->terrain.kind;
   model->method = d->solver.method, model->step = d->solver.step;
   model->tolerance = d->solver.tolerance, model->step_max = d->solver.step_max,

@@ -34,11 +34,6 @@ double hx_weight(const hxDefinition *d);
  * NULL. */
 hxStatus hx_input_check(const hxInput *input, char *message);
 
-int hx_has_elastic_gears(const hxDefinition *definition);
-
-/* Writes why coordinates are not the state of a robot with elastic gears; message as above. */
-hxStatus hx_refuse_elastic_gears(char *message);
-
 /* frames.c: vectors and quaternions, and the frames of a definition's joints */
 
 /* Computes out = a x b. */

@@ -73,12 +73,6 @@ static void check_servo(hxChecker *c, const hxDefinition *d) {
                   "more than servo.derate_temperature and servo.air_temperature");
   if (motor && !(d->servo.resistance > 0.0))
     hx_check_fail(c, "servo.resistance", d->servo.resistance, positive);
-  if (d->servo.gear_stiffness > 0.0 && !(d->servo.rotor_inertia > 0.0))
-    hx_check_fail(c, "servo.rotor_inertia", d->servo.rotor_inertia,
-                  "more than 0 with servo.gear_stiffness, whose gear moves the rotor");
-  if (d->servo.backlash > 0.0 && !(d->servo.gear_stiffness > 0.0))
-    hx_check_fail(c, "servo.gear_stiffness", d->servo.gear_stiffness,
-                  "more than 0 with servo.backlash, whose teeth meet elastically");
 }
 
 /* Returns s^T I^-1 s of an inertia I and the unit vector along an axis, 1/(kg m2). */
@@ -148,19 +142,6 @@ hxStatus hx_definition_check(const hxDefinition *d, char *message) {
   return c.status;
 }
 
-int hx_has_elastic_gears(const hxDefinition *d) {
-  return d->servo.mode != HX_SERVO_KINEMATIC && d->servo.gear_stiffness > 0.0;
-}
-
-hxStatus hx_refuse_elastic_gears(char *message) {
-  if (message)
-    hx_print(message, HX_MESSAGE_SIZE,
-             "servo.gear_stiffness: got an elastic gear, whose rotors are no continuous states; "
-             "expected 0 (rigid gears) in model exchange and for derivatives; set it to 0, or use "
-             "co-simulation and differences");
-  return HX_INVALID_ARGUMENT;
-}
-
 hxStatus hx_definition_check_coordinates(const hxDefinition *d, char *message) {
   if (d->servo.goal_speed_max > 0.0 || d->servo.overload_time > 0.0) {
     if (message)
@@ -170,7 +151,7 @@ hxStatus hx_definition_check_coordinates(const hxDefinition *d, char *message) {
                "or use co-simulation and differences");
     return HX_INVALID_ARGUMENT;
   }
-  return hx_has_elastic_gears(d) ? hx_refuse_elastic_gears(message) : HX_OK;
+  return HX_OK;
 }
 
 /* Returns whether no number of an input is outside of the narrowest ranges: of angles, rad, and of

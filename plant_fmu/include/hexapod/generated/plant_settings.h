@@ -299,12 +299,6 @@ typedef struct hxDefinition {
     double overload_duty;
     /* 1  Duty limit that the overload protection leaves */
     double overload_left;
-    /* N.m/rad  Stiffness of the gear between rotor and link, co-simulation only; 0: rigid */
-    double gear_stiffness;
-    /* N.m.s/rad  Damping of the elastic gear */
-    double gear_damping;
-    /* rad  Play of the elastic gear at the joint, from side to side */
-    double backlash;
     /* 1  Turns of the rotor for one of the joint, below 0 against it; 0: the rotor's angular
      * momentum is left out */
     double gear_ratio;
