@@ -30,7 +30,7 @@ from hexapod_cosim.cosim.export.platforms import component_library as library_to
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.ground.table import read_terrain
 
-OUTPUTS = 619
+OUTPUTS = 584
 STEPS, SHORT = 300, 150  # of the walk on the plane and of the others
 
 
