@@ -100,7 +100,8 @@ def record(folder: Path, *, duration: float, robot: str = "athena") -> Walk:
     )
     recording = simulate(scenario, fmu=fmu).outcome.recording
     inputs, wanted = folder / "inputs.csv", folder / "outputs.txt"
-    commands = Recording(("time", *names["input"]), recording.columns(["time", *names["input"]]))
+    driven = [name for name in names["input"] if name in recording.names]
+    commands = Recording(("time", *driven), recording.columns(["time", *driven]))
     write_csv(commands, inputs)
     wanted.write_text("\n".join(names["output"]), encoding="utf-8")
     recorded = Recording(
