@@ -70,6 +70,23 @@ def heading(name: str) -> str:
     return f"{name} [{column.unit}]" if column else name
 
 
+def wrong_unit(text: str) -> str | None:
+    """Returns the unit that a heading should have if its own is another one; None if it is right,
+    missing, or that of an unknown column.
+    """
+    found = HEADING.fullmatch(text)
+    column = known_columns().get(found["name"]) if found else None
+    if found is None or column is None or _plain(found["unit"]) == _plain(column.unit):
+        return None
+    return column.unit
+
+
+def _plain(unit: str) -> str:
+    """Returns a unit without differences of spelling: N m, Nm and N.m; m/s^2, m/s² and m/s2."""
+    plain = unit.strip().replace("²", "2").replace("^", "")
+    return "" if plain in ("-", NO_UNIT) else re.sub(r"[ .·*]", "", plain)
+
+
 def bare_name(text: str) -> str:
     """Returns the name in a heading with or without a unit."""
     found = HEADING.fullmatch(text)

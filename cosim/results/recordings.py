@@ -30,6 +30,7 @@ from hexapod_cosim.cosim.results.columns import (
     heading,
     known_columns,
     plant_variables,
+    wrong_unit,
 )
 from hexapod_cosim.cosim.scenario.records import default_formats
 from hexapod_cosim.models import HexapodError
@@ -188,7 +189,7 @@ def _line(row: np.ndarray) -> str:
 def read_csv(path: Path) -> Recording:
     """Reads a recording from a CSV file with or without units in the header.
 
-    Raises HexapodError for a missing or damaged file.
+    Raises HexapodError for a missing or damaged file, and for a known column in another unit.
     """
     try:
         with path.open(encoding="utf-8", newline="") as file:
@@ -196,6 +197,16 @@ def read_csv(path: Path) -> Recording:
             rows = _rows(file, len(names))
     except (OSError, ValueError, StopIteration, csv.Error) as error:
         raise _not_a_recording(path, error, "a header and rows of numbers") from error
+    for name in names:
+        unit = wrong_unit(name)
+        if unit:
+            raise HexapodError(
+                "a column in another unit",
+                got=name,
+                expected=f"{bare_name(name)} [{unit}]",
+                fix="convert its numbers; a heading without a unit counts as this one",
+                where=str(path),
+            )
     return _recording([bare_name(name) for name in names], rows, path)
 
 
