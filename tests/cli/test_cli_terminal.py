@@ -252,7 +252,12 @@ def test_json_is_all_that_is_printed(
         (["report"], ["Missing argument 'DIR'"]),
         (
             ["report", "nowhere"],
-            ["not a results folder", "got 'nowhere'", "run.json", "hexapod simulate"],
+            [
+                "not a results folder",
+                "got 'nowhere'",
+                "run.json",
+                "of `hexapod` wrote, such as simulate",
+            ],
         ),
         (
             ["report", "broken"],

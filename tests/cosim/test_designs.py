@@ -101,16 +101,16 @@ def test_a_process_packs_the_fmu_of_a_robot_once_and_a_new_binary_anew(
 ) -> None:
     packed: list[str] = []
 
-    def export(robot: Robot, path: Path) -> Path:
+    def export(robot: Robot, path: Path, *, bare: bool) -> Path:
         packed.append(robot.name)
-        return export_fmu(robot, path)
+        return export_fmu(robot, path, bare=bare)
 
     monkeypatch.setattr(plant, "export_fmu", export)
     plant._content.cache_clear()
     first, second = (PlantFmus(tmp_path / name).fmu("athena") for name in ("a", "b"))
     assert packed == ["athena"]
-    whole = export_fmu(load_robot("athena"), tmp_path / "athena.fmu").read_bytes()
-    assert first.read_bytes() == second.read_bytes() == whole
+    fresh = export_fmu(load_robot("athena"), tmp_path / "athena.fmu", bare=True).read_bytes()
+    assert first.read_bytes() == second.read_bytes() == fresh
     library = tmp_path / "hexapod.so"
     library.write_bytes(b"built later")
     monkeypatch.setattr(plant, "binary", lambda *_: library)

@@ -294,6 +294,12 @@ def test_events_are_described_in_order_and_survive_a_scenario_file() -> None:
     assert again.events == scenario.events
 
 
+FOUND = [
+    "the controller finds that the servo of LF.femur does not work",
+    "the controller walks without LF",
+]
+
+
 @pytest.mark.parametrize(
     ("control", "fault", "status"),
     [
@@ -310,7 +316,12 @@ def test_a_walk_with_faulty_sensors_goes_on_or_says_why_it_ended(
     result = simulate(load_scenario("walk_flat", overrides=overrides))
     assert result.outcome.status == status
     write_result(result, tmp_path)
-    assert [event["time"] for event in read_facts(tmp_path)["events"]] == [0.1]
+    given, *found = read_facts(tmp_path)["events"]
+    assert given["time"] == 0.1
+    # to the controller, a joint whose angle stays is one whose servo does not work
+    stuck = "femur" in fault and "stuck" in fault
+    assert [event["text"] for event in found] == (FOUND if stuck else [])
+    assert all(0.1 < event["time"] < 0.2 for event in found)
     if status == "failed":
         assert 0.1 <= result.outcome.simulated < 0.2
         assert "nan" in result.outcome.reason.lower()
