@@ -33,7 +33,6 @@ static void kernel_start(const hxModel *model, double t, hxState *state, void *s
   memset(&state->bus, 0, sizeof state->bus);
   state->bus.start = t;
   memset(&state->firmware, 0, sizeof state->firmware);
-  memcpy(state->firmware.angle, state->moment.angle, sizeof state->firmware.angle);
   state->firmware.time = t;
   for (int i = 0; i < HX_JOINTS * HX_SLOTS; ++i)
     state->measured.winding[i / HX_SLOTS][i % HX_SLOTS] =
@@ -45,6 +44,7 @@ static void kernel_start(const hxModel *model, double t, hxState *state, void *s
     hx_store(&state->measured.peak_force[pack * HX_LANES], force);
   }
   hx_fill_measured_slots(model, state);
+  memcpy(state->firmware.angle, state->moment.angle, sizeof state->firmware.angle);
   state->stored_at_start = hx_kinetic_energy(model, &state->motion, work) +
                            hx_potential_energy(model, &state->motion, work);
 }
