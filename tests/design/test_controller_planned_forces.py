@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from gains import PERIOD, make_gains, weight
+from gains import PERIOD, make_gains, unwatched, weight
 from states import changed, with_links
 from twin_motion import Motion, Z, twin_needs
 
@@ -52,8 +52,9 @@ class Step(NamedTuple):
 
 def walker(robot: Robot, gait: Gait) -> Controller:
     """A controller whose joint speeds are the planned ones."""
-    return Controller(
-        robot, period=PERIOD, gait=gait, gains=make_gains(robot), parts=Parts(touchdown=False)
+    parts = Parts(touchdown=False)
+    return unwatched(
+        Controller(robot, period=PERIOD, gait=gait, gains=make_gains(robot), parts=parts)
     )
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from gains import PERIOD, make_gains
+from gains import PERIOD, make_gains, unwatched
 from standing import DEPTH, HOME, ROBOT, WEIGHT, Laws, make_laws, plan, rest, shared
 
 from hexapod_cosim.controller import (
@@ -52,7 +52,7 @@ def walk(name: str, *, sway: bool, heft: float = HEAVY, narrowing: float = 1.0) 
     )
     assert controller.compliant is not None
     controller.compliant.adaptation = Weighed(heft, narrowing)
-    return controller
+    return unwatched(controller)
 
 
 def pushes(controller: Controller, steps: int) -> np.ndarray:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gains import PAPER, PERIOD, make_gains
+from gains import PAPER, PERIOD, make_gains, unwatched
 
 from hexapod_cosim.controller import (
     BodyCommand,
@@ -191,13 +191,15 @@ def test_a_foot_without_ground_extends_after_a_while_at_a_limited_speed_to_the_l
 
 
 def controller(parts: Parts | None = None, *, gains: bool = True) -> Controller:
-    return Controller(
-        ATHENA,
-        period=PERIOD,
-        gait=make_gait(ATHENA),
-        gains=make_gains(ATHENA) if gains else None,
-        parts=parts or Parts(),
-        law="paper",
+    return unwatched(
+        Controller(
+            ATHENA,
+            period=PERIOD,
+            gait=make_gait(ATHENA),
+            gains=make_gains(ATHENA) if gains else None,
+            parts=parts or Parts(),
+            law="paper",
+        )
     )
 
 
