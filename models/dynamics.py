@@ -161,7 +161,7 @@ def mass_matrix(robot: Robot, body: Array, joints: Constraints | None = None) ->
     """Returns M = diag(m 1, J) + J_r G^T G (114, 114).
 
     The inertia J_r of the geared rotors acts on the joint speeds; with a gear ratio n it also
-    couples them to the bodies that carry the rotors, J_r/n (G^T P + P^T G) (eq. 57). joints:
+    couples them to the bodies that carry the rotors, J_r/n (G^T P + P^T G) (eq. 54). joints:
     `constraints` at these bodies, if they are known.
     """
     M = np.zeros((6 * BODIES, 6 * BODIES))
@@ -192,14 +192,14 @@ def link_matrix(robot: Robot, body: Array, joints: Constraints | None = None) ->
 
 
 def spin_inertia(servo: Servo) -> float:
-    """Returns the inertia of a rotor times its gear ratio, J_r/n [kg m2] (eq. 57); 0: left out."""
+    """Returns the inertia of a rotor times its gear ratio, J_r/n [kg m2] (eq. 54); 0: left out."""
     return servo.rotor_inertia / servo.gear_ratio if servo.gear_ratio != 0.0 else 0.0
 
 
 def rotor_moments(robot: Robot, body: Array) -> Array:
     """Returns the moments (19, 3) of the rotors on the bodies that carry them, -h w_i x s [N m].
 
-    h is the angular momentum J_r/n times the speed of the rotor, about the joint's axis (eq. 57).
+    h is the angular momentum J_r/n times the speed of the rotor, about the joint's axis (eq. 54).
     """
     moments = np.zeros((BODIES, 3))
     spin = spin_inertia(robot.servo) * joint_speeds(robot, body).ravel()

@@ -64,7 +64,7 @@ def momentum(robot: Robot, body: Array) -> tuple[Array, Array]:
     """Returns linear momentum (3,) [kg m/s] and angular momentum (3,) about the world's origin [kg
     m2/s].
 
-    The spin of the rotors (eq. 57) is included with a gear ratio; without one it is left out.
+    The spin of the rotors (eq. 54) is included with a gear ratio; without one it is left out.
     """
     linear = masses(robot)[:, None] * body[:, 7:10]
     spin = np.einsum("kij,kj->ki", world_inertias(robot, body), body[:, 10:13])

@@ -171,14 +171,14 @@ class Servo:
     # how commands reach the servos, but in kinematic mode: transmissions, rounding of angles
     bus_period: Annotated[float, Number("s", at_least=0.0, at_most=1e3)] = 0.0
     command_step: Annotated[float, Number("rad", at_least=0.0, at_most=1.0)] = 0.0
-    # what a firmware limits besides the duty (eq. 48, 60, 61); 0: it does not
+    # what a firmware limits besides the duty (eq. 48, 57, 58); 0: it does not
     current_max: Annotated[float, Number("A", at_least=0.0, at_most=1e6)] = 0.0
     goal_speed_max: Annotated[float, Number("rad/s", at_least=0.0, at_most=1e3)] = 0.0
     # a duty above overload_duty for overload_time leaves overload_left
     overload_time: Annotated[float, Number("s", at_least=0.0, at_most=1e3)] = 0.0
     overload_duty: Annotated[float, Number("1", at_least=1e-6, at_most=1.0)] = 1.0
     overload_left: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.0
-    # turns of the rotor for one of the joint, < 0: against it (eq. 57); 0: no angular momentum
+    # turns of the rotor for one of the joint, < 0: against it (eq. 54); 0: no angular momentum
     gear_ratio: Annotated[float, Number("1", at_least=-1e6, at_most=1e6)] = 0.0
 
 

@@ -52,6 +52,7 @@ GROUPS: dict[str, list[str]] = {
     "lift": LIFT,
     "planned": PLANNED,
     **{flag: [f"{leg}.{flag}" for leg in LEG_NAMES] for flag in FLAGS},
+    "faulty": [f"{leg}.{flag}" for leg in LEG_NAMES for flag in FAULTY],
     "command": COMMANDS,
 }
 OURS = {*SOURCES, *SINKS, *DIAGNOSED, *DIAGNOSED_FLAGS}

@@ -352,7 +352,7 @@ def contact_wrenches(
 
 
 def pair_wrenches(robot: Robot, body: Array, contacts: Contacts) -> Array:
-    """Returns forces and torques (19, 6) of legs on each other [N, N m] (eq. 59)."""
+    """Returns forces and torques (19, 6) of legs on each other [N, N m] (eq. 56)."""
     g = np.zeros((len(body), 6))
     if all(state.is_open for state in contacts.pairs):
         return g

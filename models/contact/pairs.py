@@ -1,4 +1,4 @@
-"""Computes contacts between the femurs and tibias of neighbouring legs, as capsules (eq. 59),
+"""Computes contacts between the femurs and tibias of neighbouring legs, as capsules (eq. 56),
 and their distances.
 
 The femur of a leg has the radius of its knee, the tibia that of its shank. A contact is the point

@@ -218,7 +218,7 @@ def supply_power(
 
 def moved_goal(servo: Servo, setpoint: Array, goal: Array, h: Array | float) -> Array:
     """Returns the firmware's setpoint [rad] a time h [s] later: it follows the commanded angle at
-    most at `goal_speed_max` (eq. 60), or at once where that is 0.
+    most at `goal_speed_max` (eq. 57), or at once where that is 0.
     """
     if not np.any(servo.goal_speed_max):
         return goal
@@ -230,7 +230,7 @@ def overload_share(
     servo: Servo, wanted: Array, loaded: Array | float, h: Array | float
 ) -> tuple[Array | float, Array | float]:
     """Returns the share of the duty limit that the overload protection leaves, and how long the
-    wanted duty has been above `overload_duty` after a further time h [s] (eq. 61).
+    wanted duty has been above `overload_duty` after a further time h [s] (eq. 58).
 
     wanted: torque at standstill, as of `motor_torque` [N m]. loaded: the time before [s], < 0 of a
     duty below 0. It begins anew where the wanted duty changes its sign.

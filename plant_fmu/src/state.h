@@ -122,7 +122,7 @@ typedef struct hxModel {
   int servo_drive;                  /* hxServoDrive */
   int measured_friction;            /* 1: the gears have more than Coulomb friction */
   int stribeck;                     /* 1: it has Stribeck terms */
-  int spin;                         /* 1: the rotors have angular momentum (eq. 57) */
+  int spin;                         /* 1: the rotors have angular momentum (eq. 54) */
   int has_soil; /* 1: the ground may be soil, of the definition or of a material of the terrain */
   int rows, foot_rows, torso_rows; /* computed: on tibias, of these on feet, on the torso (0, 1) */
   int pair_rows, listed;           /* between legs (0 or HX_PAIR_ROWS); all together */
@@ -148,13 +148,13 @@ typedef struct hxModel {
   double stribeck_motor, stribeck_external;     /* 1  K_ms, K_es */
   double quadratic_motor, quadratic_external;   /* 1/(N m)  K_mq, K_eq */
   double per_stribeck_speed, stribeck_exponent; /* s/rad, 1  1/w_s, a */
-  double spin_inertia; /* kg m2  of the rotor, times its gear ratio (eq. 57) */
+  double spin_inertia; /* kg m2  of the rotor, times its gear ratio (eq. 54) */
   double voltage, duty_max, supply_resistance; /* V, 1, ohm */
   hxHeat heat;
   double bus_period, command_step; /* s, rad  0 in kinematic mode */
   double current_torque;           /* N m    k_t times the largest current; huge: no limit */
   double goal_speed;               /* rad/s  of the firmware's setpoints; 0: no limit */
-  double overload_time, overload_torque, overload_left; /* s, N m, 1  eq. 61 */
+  double overload_time, overload_torque, overload_left; /* s, N m, 1  eq. 58 */
   double ground_point[3], ground_normal[3];
   double soil[HX_SOIL_SHAPES][HX_SOIL_SIZE]; /* hxSoil of each shape, of the definition */
   double bristle_length;                     /* m  presliding, or shear displacement of the soil */
@@ -188,10 +188,10 @@ typedef struct hxBus {
 
 /* What the servos' firmware remembers, legs innermost. */
 typedef struct hxFirmware {
-  double angle[HX_JOINTS][HX_SLOTS];  /* rad    setpoints at the last command (eq. 60), */
+  double angle[HX_JOINTS][HX_SLOTS];  /* rad    setpoints at the last command (eq. 57), */
   double rate[HX_JOINTS][HX_SLOTS];   /* rad/s  their speed since, */
   double time;                        /* s      and its time */
-  double loaded[HX_JOINTS][HX_SLOTS]; /* s  of a duty above the overload limit (eq. 61), with the
+  double loaded[HX_JOINTS][HX_SLOTS]; /* s  of a duty above the overload limit (eq. 58), with the
                                        *    sign of the duty */
 } hxFirmware;
 

@@ -139,15 +139,18 @@ def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_time_to_the_li
     np.testing.assert_allclose(offsets[begun:], np.maximum(reach, -0.04), atol=1e-12)
 
 
-def test_an_awaited_foot_searches_at_once_at_a_set_speed_and_stops_within_a_period() -> None:
-    down = Touchdown(period=STEP)
-    for k in range(1, 21):
-        down.step(NO, STILL, YES, NO, only_leg(2), NO)
-        assert down.offset[2] == pytest.approx(-0.08 * STEP * k)
-    assert np.count_nonzero(down.offset) == 1
-    found = down.offset[2]
-    down.step(only_leg(2), STILL, YES, NO, NO, NO)
-    assert down.offset[2] == found
+def test_an_awaited_foot_searches_at_a_speed_that_grows_and_stops_within_a_period() -> None:
+    """C50: the speed grows with the square of the time waited, to its full value in 60 ms."""
+    down, reached = Touchdown(period=STEP), 0.0
+    for search in range(2):  # the second search begins as slowly as the first
+        for k in range(1, 21):
+            down.step(NO, STILL, YES, NO, only_leg(2), NO)
+            reached -= 0.08 * STEP * min(k * STEP / 0.06, 1.0) ** 2
+            assert down.offset[2] == pytest.approx(max(reached, -0.04), abs=1e-12)
+        assert np.count_nonzero(down.offset) == 1
+        found = down.offset[2]
+        down.step(only_leg(2), STILL, YES, NO, NO, NO)
+        assert down.offset[2] == found, f"search {search}"
     for _ in range(200):
         down.step(NO, STILL, YES, NO, only_leg(2), NO)
     assert down.offset[2] == -0.04

@@ -22,7 +22,7 @@ void hx_bus_send(hxCommand *command, const hxModel *model, hxState *state);
 /* Returns the time of the next transmission if it is before t_end, else t_end, s. */
 double hx_bus_end(const hxModel *model, const hxState *state, double t_end);
 
-/* Replaces commanded angles by the firmware's setpoints at the present time (eq. 60). */
+/* Replaces commanded angles by the firmware's setpoints at the present time (eq. 57). */
 void hx_setpoints(hxCommand *command, const hxModel *model, const hxState *state);
 
 /* Does the same at the begin of a command until t_end, s, and sets the speeds at which the
@@ -31,11 +31,11 @@ void hx_follow_goals(hxCommand *command, const hxModel *model, hxState *state, d
                      hxCommand *ramp);
 
 /* Counts a time, s, of the duties under a command at the last moment that are above the overload
- * limit (eq. 61). */
+ * limit (eq. 58). */
 void hx_count_overload(const hxCommand *command, const hxModel *model, hxState *state, double h);
 
 /* Sets what the motors get from their supply in a command: the shares of their duty limits by the
- * temperatures of their windings (eq. 52) and the overload protection (eq. 61), and the supply's
+ * temperatures of their windings (eq. 52) and the overload protection (eq. 58), and the supply's
  * voltage under the currents of this command at the last moment (eq. 53). */
 void hx_command_supply(hxCommand *command, const hxModel *model, const hxState *state);
 

@@ -23,7 +23,7 @@ static inline hxRigid6 link_inertia(const hxModel *model, const hxJointWork *k, 
   return hx_rigid_inertia(hx_load(&model->joint[joint].mass[slot]), k->J, k->c);
 }
 
-/* Adds the coupling of a rotor and its parent to U (eq. 58). */
+/* Adds the coupling of a rotor and its parent to U (eq. 55). */
 HX_RARE void couple_rotor(const hxModel *model, hxSweep *sweep) {
   sweep->U.ang = hx_add_scaled(sweep->U.ang, hx_splat(model->spin_inertia), sweep->S.ang);
 }

@@ -151,7 +151,7 @@ static inline void joint_torque(const hxModel *model, const hxCommand *command, 
 }
 
 /* Computes what the change of direction of the rotors' angular momenta needs of the bodies that
- * carry them, h w_i x s (eq. 57): links get it as a part of p. */
+ * carry them, h w_i x s (eq. 54): links get it as a part of p. */
 HX_RARE void rotor_moments(const hxModel *model, const hxBody *torso, hxLegWork *leg) {
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     hxJointWork *k = &leg->joint[joint];

@@ -27,7 +27,7 @@ static hxReal body_kinetic(hxReal mass, hxSym3 J, hxVec3 v, hxVec3 w) {
 }
 
 /* Returns the part of the kinetic energy by which the rotors of a leg turn with the bodies that
- * carry them, h s.w_i (eq. 57), J. */
+ * carry them, h s.w_i (eq. 54), J. */
 static hxReal spin_energy(const hxModel *model, const hxBody *torso, const hxLegWork *leg) {
   hxReal energy = hx_splat(0.0);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {

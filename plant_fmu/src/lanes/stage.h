@@ -208,7 +208,7 @@ static inline void leg_response(const hxModel *model, const hxImplicit *implicit
   tibia_response(model, implicit, pack, &j, leg);
 }
 
-/* Adds to joints and the bodies that carry them what the rotors' angular momenta need (eq. 58). */
+/* Adds to joints and the bodies that carry them what the rotors' angular momenta need (eq. 55). */
 HX_RARE void rotor_coupling(const hxModel *model, hxLegWork *leg) {
   const hxNumber spin = model->spin_inertia;
   for (int joint = 0; joint < HX_JOINTS; ++joint) {

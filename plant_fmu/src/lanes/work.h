@@ -13,7 +13,7 @@ typedef struct {
   hxForce6 U;       /* I S, with I the articulated inertia of the child and all it carries */
   hxReal inverse_d; /* 1/d; 0 for a kinematic drive */
   hxReal u;         /* torque - S.p */
-  hxVec3 passed; /* N m  torque that the rotor's motion needs of the parent (eq. 58): with spin */
+  hxVec3 passed; /* N m  torque that the rotor's motion needs of the parent (eq. 55): with spin */
 } hxSweep;
 
 /* A joint and its child. */
