@@ -17,10 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
+from hexapod_cosim.extensions.identify.bench import read_bench_log
 from hexapod_cosim.extensions.identify.bench.command import BenchReplay, drawn
 from hexapod_cosim.extensions.identify.bench.errors import Errors, log_errors
 from hexapod_cosim.extensions.identify.bench.fit import fit_servo
-from hexapod_cosim.extensions.identify.bench.log import BenchLog, read_bench_log
+from hexapod_cosim.extensions.identify.bench.log import BenchLog
 from hexapod_cosim.extensions.identify.bench.pendulum import Bench
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.records import Servo

@@ -58,6 +58,11 @@ class PlannedFeet(NamedTuple):
     twist: Twist  # of the body
 
 
+def _ground_motion(feet: PlannedFeet) -> Plane:
+    """Returns the velocities (6,) of the body over the ground at its feet [m/s]."""
+    return feet.twist.velocity + 1j * feet.twist.yaw_rate * feet.plane
+
+
 class FootPaths(Stateful):
     """Paths of the feet within a section of the walk.
 
@@ -226,15 +231,18 @@ class FootPaths(Stateful):
         self.clock.hold(number)
         return self._set_out(now, twist)
 
+    def _lift_offs(self, begin: Array) -> Array:
+        """Returns the times (6,) to the next lift-offs [s]. begin: (6,) present phases [cycles]."""
+        left = self.gait.duty - begin + CLOCK_EPSILON
+        return np.asarray((left - np.floor(left)) * self.gait.period)
+
     def _farthest(self, feet: PlannedFeet, begin: Array) -> float:
         """Returns how far a foot will be from its stance position at its lift-off [m] (C55).
 
         It is that of the farthest foot. feet: that stand; begin: (6,) phases at the begin of the
         walk [cycles].
         """
-        left = self.gait.duty - begin + CLOCK_EPSILON
-        time = (left - np.floor(left)) * self.gait.period
-        motion = feet.twist.velocity + 1j * feet.twist.yaw_rate * feet.plane
+        time, motion = self._lift_offs(begin), _ground_motion(feet)
         far = np.abs(feet.plane - motion * time - self._aims())
         return float(far[~self.clock.absent].max())
 
@@ -245,9 +253,7 @@ class FootPaths(Stateful):
 
         feet, begin: as for _farthest(); torso: its way from its nominal place [m].
         """
-        left = self.gait.duty - begin + CLOCK_EPSILON
-        lift = (left - np.floor(left)) * self.gait.period
-        motion = feet.twist.velocity + 1j * feet.twist.yaw_rate * feet.plane
+        lift, motion = self._lift_offs(begin), _ground_motion(feet)
         ahead = self._aims() + motion * (self.landing_lead + lift)
         least = np.inf
         for leg in np.flatnonzero(~self.clock.absent):

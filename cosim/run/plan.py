@@ -71,8 +71,8 @@ def chosen_gains(scenario: Scenario, given: Gains | None = None) -> Gains | None
     """Returns the gains that a scenario runs with, None unless its control needs gains.
 
     They are the given ones, or else designed for its robot and macro-step; those in [gains] of the
-    scenario replace them. Raises GainsError when
-    no gains can be designed, HexapodError for a robot that cannot be read.
+    scenario replace them. Raises GainsError when no gains can be designed, HexapodError for a robot
+    that cannot be read.
     """
     control = control_of(scenario.control)
     if not control.is_builtin or control.name == "kinematic":

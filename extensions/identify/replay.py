@@ -26,7 +26,7 @@ from hexapod_cosim.cosim.results.folder import RESULTS, results_folder
 from hexapod_cosim.cosim.results.recordings import write_recording
 from hexapod_cosim.cosim.scenario.records import default_formats
 from hexapod_cosim.cosim.scenario.tables import with_overrides
-from hexapod_cosim.extensions.identify.bench.log import is_bench_log
+from hexapod_cosim.extensions.identify.bench import is_bench_log
 from hexapod_cosim.extensions.identify.experiment import Experiment
 from hexapod_cosim.extensions.identify.log import (
     Log,

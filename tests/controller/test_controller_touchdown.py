@@ -201,6 +201,14 @@ def step(landings: Landings, swinging: np.ndarray, heights: list[float]) -> None
     landings.look(ALL, LOW, NONE)
 
 
+def landed() -> Landings:
+    """Returns the landings of feet that have all met the ground at 10 mm."""
+    landings = Landings()
+    for swinging in (FIRST, ~FIRST, FIRST, ~FIRST):
+        step(landings, swinging, [0.010] * 6)
+    return landings
+
+
 def test_feet_are_expected_as_low_as_the_lowest_of_the_others() -> None:
     landings = Landings()
     step(landings, FIRST, [0.012, 0.0, 0.010, 0.0, 0.014, 0.0])
@@ -227,9 +235,7 @@ def test_a_foot_is_early_that_meets_the_ground_two_millimetres_above_where_it_is
     above: float, early: bool
 ) -> None:
     """All feet have landed at 10 mm before; now foot 0 meets a bump."""
-    landings = Landings()
-    for swinging in (FIRST, ~FIRST, FIRST, ~FIRST):
-        step(landings, swinging, [0.010] * 6)
+    landings = landed()
     expected = landings.expected(ALL, LOW, NONE)
     step(landings, np.arange(6) == 0, [0.010 + above, *[0.0] * 5])
     np.testing.assert_array_equal(landings.early(expected, np.full(6, 0.03)), [early, *[False] * 5])
@@ -239,9 +245,7 @@ def test_a_foot_is_early_that_meets_the_ground_two_millimetres_above_where_it_is
 def test_a_foot_is_early_only_while_its_path_is_two_millimetres_above_the_common_ground(
     above: float, early: bool
 ) -> None:
-    landings = Landings()
-    for swinging in (FIRST, ~FIRST, FIRST, ~FIRST):
-        step(landings, swinging, [0.010] * 6)
+    landings = landed()
     expected = landings.expected(ALL, LOW, NONE)
     step(landings, np.arange(6) == 0, [0.020, *[0.0] * 5])
     assert landings.early(expected, np.full(6, 0.010 + above))[0] == early

@@ -18,9 +18,10 @@ from plant import Plant
 from test_laws_servo import tibias
 from test_pendulum import bench as robot_on_wall
 
+from hexapod_cosim.extensions.identify.bench import read_bench_log
 from hexapod_cosim.extensions.identify.bench.errors import Errors, judged
 from hexapod_cosim.extensions.identify.bench.fit import fit_servo
-from hexapod_cosim.extensions.identify.bench.log import BenchLog, read_bench_log
+from hexapod_cosim.extensions.identify.bench.log import BenchLog
 from hexapod_cosim.extensions.identify.bench.pendulum import STEP, Bench
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.dynamics import Command

@@ -33,7 +33,7 @@ typedef struct hxControllerState {
   int changing; /* to the other model */
   hxHealth health;
   int regait; /* the legs in service have changed: the other model is to be that of their gait */
-  int back;   /* a leg that is taken back into service with the next gait, counted from 1; 0: none */
+  int back;   /* leg that is taken back into service with the next gait, counted from 1; 0: none */
   hxControllerOutput output; /* of the last tick */
 } hxControllerState;
 

@@ -16,10 +16,11 @@ import tomlkit
 from hexapod_cosim.controller.figure_style import PALETTE, SETTINGS, WIDTH
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.report.page import render
+from hexapod_cosim.extensions.identify.bench import read_bench_log
 from hexapod_cosim.extensions.identify.bench.choice import Choice, choose
 from hexapod_cosim.extensions.identify.bench.errors import Errors, log_errors
 from hexapod_cosim.extensions.identify.bench.fit import BENCH, fit_servo
-from hexapod_cosim.extensions.identify.bench.log import BenchLog, read_bench_log
+from hexapod_cosim.extensions.identify.bench.log import BenchLog
 from hexapod_cosim.extensions.identify.bench.pendulum import Bench, Swing
 from hexapod_cosim.extensions.identify.numbers.servo import TERMS
 from hexapod_cosim.extensions.identify.report import embedded, number

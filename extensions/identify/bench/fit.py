@@ -52,10 +52,7 @@ class ServoFit:
     @property
     def values(self) -> dict[str, float]:
         """The numbers by key."""
-        return {
-            row.key: row.value(one, self.before[row.key])
-            for row, one in zip(self.rows, self.z.tolist(), strict=True)
-        }
+        return _values(self.rows, self.before, self.z)
 
     def interval(self, key: str) -> tuple[float, float]:
         """Returns the 95 % interval of a number."""
@@ -67,6 +64,13 @@ class ServoFit:
         return bench.simulate(self.robot.servo, self.values[OFFSET], self.values[DELAY])
 
 
+def _values(rows: Sequence[Unknown], before: Mapping[str, float], z: Array) -> dict[str, float]:
+    """Returns the numbers by key at distances z (rows,) from those before, in priors."""
+    return {
+        row.key: row.value(one, before[row.key]) for row, one in zip(rows, z.tolist(), strict=True)
+    }
+
+
 class _Problem:
     """Residuals of angles in deviations, with those from the start's values behind them."""
 
@@ -76,23 +80,12 @@ class _Problem:
 
     def errors(self, points: Array) -> Array:
         """Returns simulated - measured angles in deviations (rows, points, logs)."""
-        values = [
-            {
-                row.key: row.value(z, self.before[row.key])
-                for row, z in zip(self.rows, one, strict=True)
-            }
-            for one in points.tolist()
-        ]
+        values = [_values(self.rows, self.before, z) for z in points]
         robots = [self.changed(one) for one in values]
         offset, delay = (np.array([[one[key]] for one in values]) for key in (OFFSET, DELAY))
         swing = self.bench.simulate(stacked([one.servo for one in robots]), offset, delay)
         error = swing.angle - self.bench.measured[:, None]
         return np.where(self.bench.counted[:, None], error, 0.0) / NOISE
-
-    def values(self, z: Array) -> dict[str, float]:
-        """Returns the numbers by key."""
-        pairs = zip(self.rows, z.tolist(), strict=True)
-        return {row.key: row.value(one, self.before[row.key]) for row, one in pairs}
 
     def changed(self, values: Mapping[str, float]) -> Robot:
         """Returns the robot with the servo's numbers."""
@@ -150,7 +143,7 @@ def fit_servo(
     problem = _Problem(Bench(logs), robot, rows)
     z = _searched(problem, min(found)[2], STEPS)
     return ServoFit(
-        robot=problem.changed(problem.values(z)),
+        robot=problem.changed(_values(rows, problem.before, z)),
         rows=tuple(rows),
         z=z,
         before=problem.before,

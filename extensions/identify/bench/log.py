@@ -6,16 +6,12 @@ equally far apart.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from hexapod_cosim.extensions.identify.log import LogError
 
 Array = NDArray[np.float64]
 
@@ -54,27 +50,3 @@ Entries = Sequence[Mapping[str, Any]]
 def column(entries: Entries, name: str) -> Array:
     """Returns a column of a log's entries."""
     return np.array([float(entry[name]) for entry in entries])
-
-
-def is_bench_log(path: Path) -> bool:
-    """Returns whether a file may be the log of a servo bench."""
-    return path.suffix.lower() == ".json"
-
-
-def read_bench_log(path: Path) -> BenchLog:
-    """Reads a log of BAM or K-Scale. Raises LogError for another file."""
-    # they import this module
-    from hexapod_cosim.extensions.identify.bench import bam, kscale  # noqa: PLC0415
-
-    try:
-        table = json.loads(path.read_text(encoding="utf-8"))
-        readers: dict[bool, Callable[[Path, Any], BenchLog]] = {True: kscale.read, False: bam.read}
-        return readers["actuator_id" in table](path, table)
-    except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
-        raise LogError(
-            "no log of a servo bench",
-            got=f"{type(error).__name__}: {error}",
-            expected="a JSON file of BAM or K-Scale with mass, length, kp and entries",
-            fix="name the raw logs, as they were recorded",
-            where=str(path),
-        ) from error

@@ -227,19 +227,28 @@ static inline void hx_foot_paths_hold(const hxFootPathsModel *model, const hxPla
   set_out(model, paths, now, twist, first);
 }
 
+/* Returns the time to the next lift-off of a leg [s]. begin: its present phase [cycles]. */
+static inline double lift_off(const hxFootPathsModel *model, double begin) {
+  return hx_fraction(model->clock.duty - begin + clock_epsilon) * model->clock.gait_period;
+}
+
+/* Returns the velocity of the body over the ground at a foot [m/s]. */
+static inline hxPlane ground_motion(const hxPlannedFeet *feet, int leg) {
+  const hxPlane v = feet->twist.velocity, p = feet->plane[leg];
+  const double w = feet->twist.yaw_rate;
+  return hx_plane(v.x - w * p.y, v.y + w * p.x);
+}
+
 /* Returns how far the farthest foot will be from its stance position at its lift-off [m] (C55).
  * begin: phases at the begin of the walk [cycles]. */
 HX_SELDOM static double farthest(const hxFootPathsModel *model, const hxFootPaths *paths,
                                  const hxPlannedFeet *feet, const double begin[HX_LEGS]) {
-  const hxPlane v = feet->twist.velocity;
-  const double w = feet->twist.yaw_rate;
   double largest = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     if (paths->clock.absent[leg]) continue;
-    const hxPlane p = feet->plane[leg], motion = hx_plane(v.x - w * p.y, v.y + w * p.x);
-    const double left = model->clock.duty - begin[leg] + clock_epsilon,
-                 time = hx_fraction(left) * model->clock.gait_period;
-    const hxPlane there = hx_plane_sub(p, hx_scaled(motion, time)),
+    const double time = lift_off(model, begin[leg]);
+    const hxPlane way = hx_scaled(ground_motion(feet, leg), time),
+                  there = hx_plane_sub(feet->plane[leg], way),
                   away = hx_plane_sub(there, aims(model, paths, leg));
     largest = hx_larger(largest, sqrt(hx_square(away)));
   }
@@ -267,12 +276,8 @@ HX_SELDOM static double inside(const hxPlane feet[HX_LEGS], const int stands[HX_
 HX_SELDOM static double steadiness(const hxFootPathsModel *model, const hxFootPaths *paths,
                                    const hxPlannedFeet *feet, const double begin[HX_LEGS],
                                    const hxAbsenceModel *absent, const hxAbsence *absence) {
-  const hxPlane v = feet->twist.velocity;
-  const double w = feet->twist.yaw_rate;
   double lift[HX_LEGS], least = INFINITY;
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    lift[leg] = hx_fraction(model->clock.duty - begin[leg] + clock_epsilon) *
-                model->clock.gait_period;
+  for (int leg = 0; leg < HX_LEGS; ++leg) lift[leg] = lift_off(model, begin[leg]);
   for (int i = 0; i < 2 * HX_LEGS; ++i) { /* lift-off and touch-down of each leg */
     const int swings = i / 2;
     const double time = lift[swings] + (i % 2 ? model->swing_time : 0.0);
@@ -280,7 +285,7 @@ HX_SELDOM static double steadiness(const hxFootPathsModel *model, const hxFootPa
     int stands[HX_LEGS];
     if (paths->clock.absent[swings]) continue;
     for (int leg = 0; leg < HX_LEGS; ++leg) {
-      const hxPlane p = feet->plane[leg], motion = hx_plane(v.x - w * p.y, v.y + w * p.x);
+      const hxPlane p = feet->plane[leg], motion = ground_motion(feet, leg);
       const hxPlane ahead = hx_plane_add(aims(model, paths, leg),
                                          hx_scaled(motion, model->landing_lead + lift[leg]));
       place[leg] = hx_plane_sub(time < lift[leg] + model->swing_time ? p : ahead,

@@ -193,7 +193,8 @@ static inline void hx_gait_clock_landing(const hxGaitClockModel *model, const hx
   const int64_t next = hx_gait_clock_reached(clock, number) + 1;
   const int dropped = hx_gait_clock_drops(clock);
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    landing[leg] = clock->walking && !dropped && clock->swinging[leg] && hx_gait_clock_stands(model, leg, next);
+    landing[leg] = clock->walking && !dropped && clock->swinging[leg] &&
+                   hx_gait_clock_stands(model, leg, next);
 }
 
 /* Begins a section in which the clock stands still (C50). number: as for landing. */
