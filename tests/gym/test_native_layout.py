@@ -20,7 +20,7 @@ from hexapod_cosim.cosim.common.plant_files import fmi_headers
 from hexapod_cosim.cosim.master import loop_library
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.loop_library import HEADERS, ORDER
-from hexapod_cosim.extensions.gym import batch, native
+from hexapod_cosim.extensions.gym import native
 from hexapod_cosim.extensions.gym.batch import Batch
 from hexapod_cosim.extensions.gym.settings import BLOCKS, REASONS, TERMS, EnvSettings
 from hexapod_cosim.models import FmuError
@@ -228,7 +228,7 @@ def test_python_lists_the_names_of_the_header_in_their_order() -> None:
         "HX_SEE_": tuple(BLOCKS),
         "HX_TERM_": TERMS,
         "HX_END_": ("none", *REASONS[1:]),
-        "HX_AUTORESET_": batch.AUTORESET,
+        "HX_AUTORESET_": native.AUTORESET,
     }
     for prefix, expected in names.items():
         found = [name for name in HEADER.constants if name.startswith(prefix)]

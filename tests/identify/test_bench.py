@@ -103,7 +103,7 @@ def made_log(
     **more: Any,
 ) -> BenchLog:
     """Returns the log of a bench whose readings have no errors."""
-    time = 0.005 * np.arange(len(goal))
+    time = 0.005 * np.arange(len(goal), dtype=np.float64)
     given: dict[str, Any] = {"mass": ROD.mass, "rod": ROD.rod, "length": ROD.length, **more}
     zero = np.zeros(len(goal))
     log = BenchLog(

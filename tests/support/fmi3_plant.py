@@ -76,9 +76,11 @@ class Plant3:
         }.get(kind, [])
         self._intermediate = intermediate
         self._update = UPDATE(self._on_update) if intermediate else None
-        after = {"CoSimulation": [self._update], "ScheduledExecution": [None, None, None]}.get(
-            kind, []
-        )
+        callbacks: dict[str, list[Any]] = {
+            "CoSimulation": [self._update],
+            "ScheduledExecution": [None, None, None],
+        }
+        after = callbacks.get(kind, [])
         instantiate = getattr(self._library, f"fmi3Instantiate{kind}")
         instantiate.restype = ctypes.c_void_p
         self.handle = instantiate(*texts, *flags, *between, None, self._logger, *after)

@@ -299,7 +299,8 @@ static inline void hx_walk_plan_present_step(const hxWalkPlanModel *model, const
   hxLoadPlan *load = &present->load;
   double height[HX_LEGS];
   hxDemand demand;
-  hx_inverse_dynamics_demand(&planner->laws.dynamics, planner->leg, &motion, speed, &now->posture,
+  hx_inverse_dynamics_demand(&planner->laws.dynamics, planner->leg, &motion,
+                             (const double (*)[HX_JOINTS])speed, &now->posture,
                              hx_step_planner_laden(planner, laws), &demand);
   load->overspeed = 0;
   for (int k = 0; k < HX_LEGS; ++k) {

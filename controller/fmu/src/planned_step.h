@@ -104,17 +104,15 @@ static inline void hx_step_planner_lay_out(const hxStepPlanner *model, const hxG
   const double narrowing = laws->adaptation.narrowing;
   const hxPlane away = hx_absence_torso(absent, absence, ahead);
   double presence[HX_LEGS];
-  for (int k = 0; k < HX_LEGS; ++k)
-    presence[k] = hx_absence_presence(absent, absence, k, ahead);
+  for (int k = 0; k < HX_LEGS; ++k) presence[k] = hx_absence_presence(absent, absence, k, ahead);
   step->torso = away;
   if (model->compliant && hx_sway_acts(sway, narrowing)) {
     const double laden = hx_load_adaptation_laden(&laws->adaptation);
     step->torso = hx_sway_guess(sway, &step->feet, laden);
     stand(model, clock, presence, step);
     step->torso = hx_plane_add(
-        away,
-        hx_scaled(hx_sway_of(sway, &model->laws.dynamics, step->torso, &step->masses, laden),
-                  narrowing));
+        away, hx_scaled(hx_sway_of(sway, &model->laws.dynamics, step->torso, &step->masses, laden),
+                        narrowing));
   }
   stand(model, clock, presence, step);
 }

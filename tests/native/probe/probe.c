@@ -28,10 +28,6 @@ static void put3(hxVec3 a, int lane, double *out) {
   out[0] = hx_lane(a.x, lane), out[1] = hx_lane(a.y, lane), out[2] = hx_lane(a.z, lane);
 }
 
-static hxQuat quat(const double p[4]) {
-  return (hxQuat){hx_splat(p[0]), hx_splat(p[1]), hx_splat(p[2]), hx_splat(p[3])};
-}
-
 /* Evaluates n numbers pack by pack; n is a multiple of HX_SLOTS. */
 HX_API void hx_probe_tanh(const double *x, double *out, int n) {
   for (int i = 0; i < n; i += HX_LANES) hx_store(out + i, hx_tanh(hx_load(x + i)));

@@ -137,10 +137,10 @@ static inline void hx_compliant_lowered(const hxCompliantModel *model, const hxG
                                         const double phase[HX_LEGS], const hxPlane plane[HX_LEGS],
                                         double activation[HX_LEGS], double lowering[HX_LEGS]) {
   for (int k = 0; k < HX_LEGS; ++k)
-    activation[k] = clock->awaited[k]
-                        ? 0.0
-                        : activation[k] *
-                              hx_support_activation(&model->support, phase[k], clock->stayed[k],
+    activation[k] =
+        clock->awaited[k]
+            ? 0.0
+            : activation[k] * hx_support_activation(&model->support, phase[k], clock->stayed[k],
                                                     clock->stays[k], clock->walking);
   hx_support_lowering(&model->support, plane, activation, lowering);
 }

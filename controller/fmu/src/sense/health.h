@@ -55,8 +55,7 @@ static inline void judge(double period, double excess, int rests, int leg, int j
   double *strange = &health->strange[leg][joint], *still = &health->still[leg][joint],
          *proof = &health->proof[leg][joint];
   int *faulty = &health->faulty[leg][joint];
-  const double size = fabs(excess),
-               sign = size > strange_share ? (excess > 0.0 ? 1.0 : -1.0) : 0.0;
+  const double size = fabs(excess), sign = size > strange_share ? (excess > 0.0 ? 1.0 : -1.0) : 0.0;
   *still = rests ? *still + period : 0.0;
   *strange = (sign * *strange > 0.0 ? *strange : 0.0) + sign * period;
   *proof = size < sound_share ? *proof + period : 0.0;
@@ -75,9 +74,9 @@ static inline void hx_health_step(const hxHealthModel *model, const hxLegSolver 
     hx_leg_solver_load_torques(&leg[k], angle[k], force[k], load);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const double now = angle[k][joint], before = health->begun ? health->angle[k][joint] : now;
-      const double excess = unexplained(
-          model, leg[k].speed_max, before, now, command->angle_ref[k][joint],
-          command->speed_ref[k][joint], command->torque_ref[k][joint], load[joint]);
+      const double excess =
+          unexplained(model, leg[k].speed_max, before, now, command->angle_ref[k][joint],
+                      command->speed_ref[k][joint], command->torque_ref[k][joint], load[joint]);
       judge(model->period, excess, fabs(now - before) < still_speed * model->period, k, joint,
             health);
       health->angle[k][joint] = now;

@@ -27,9 +27,9 @@ static const double swift = 0.6, low_step = 0.6;
 static const double shift_time = 0.4; /* s, in which the torso moves over the other feet */
 /* s, in which the walk then takes the torso back to its path */
 static const double back_time = 3.0;
-static const double far_shift = 0.045;  /* m, at most */
-static const double fold_speed = 4.0;   /* rad/s */
-static const double lead = 0.15;        /* rad, of a command before its joint, at most */
+static const double far_shift = 0.045; /* m, at most */
+static const double fold_speed = 4.0;  /* rad/s */
+static const double lead = 0.15;       /* rad, of a command before its joint, at most */
 /* rad, from its place, at which a faulty joint has another one */
 static const double limp_way = 0.25;
 static const double fold_margin = 0.1;  /* rad, of a folded joint from its limit */
@@ -88,8 +88,7 @@ static inline hxPlane hx_absence_torso(const hxAbsenceModel *model, const hxAbse
  * nominal place moves as far as the torso has moved from there, in the other direction. */
 static inline hxPlane hx_absence_drift(const hxAbsenceModel *model, const hxAbsence *absence,
                                        int64_t ahead) {
-  const double x =
-      ((double)(absence->since + ahead) * model->period - shift_time) / back_time;
+  const double x = ((double)(absence->since + ahead) * model->period - shift_time) / back_time;
   if (!(0.0 < x && x < 1.0)) return hx_plane(0.0, 0.0);
   return hx_scaled(hx_plane_sub(absence->begin, absence->goal), 6.0 * x * (1.0 - x) / back_time);
 }
@@ -180,8 +179,7 @@ HX_SELDOM static int fold_leg(const hxAbsenceModel *model, const hxLegSolver *le
     if (fabs(angle[j] - *place) > limp_way) *place = angle[j];
     if (health->faulty[k][j]) target[j] = *place + swing;
     const double wanted = lost ? target[j] : *planned;
-    const double way =
-        hx_clamp(wanted, leg->angle_min[j], leg->angle_max[j]) - *command;
+    const double way = hx_clamp(wanted, leg->angle_min[j], leg->angle_max[j]) - *command;
     const double moved =
         hx_clamp(*command + hx_clamp(way, -step, step), angle[j] - lead, angle[j] + lead);
     there &= fabs(moved - *planned) < arrived;
@@ -206,8 +204,8 @@ static inline int hx_absence_fold(const hxAbsenceModel *model, const hxLegSolver
                swing = trial_swing * hx_cis(turn * time).y;
   ++absence->trial;
   for (int k = 0; k < HX_LEGS; ++k)
-    if (absence->legs[k] &&
-        fold_leg(model, &leg[k], k, angle[k], health, swing, absence, output) && back < 0)
+    if (absence->legs[k] && fold_leg(model, &leg[k], k, angle[k], health, swing, absence, output) &&
+        back < 0)
       back = k;
   return back;
 }

@@ -286,10 +286,10 @@ HX_SELDOM static double steadiness(const hxFootPathsModel *model, const hxFootPa
     if (paths->clock.absent[swings]) continue;
     for (int leg = 0; leg < HX_LEGS; ++leg) {
       const hxPlane p = feet->plane[leg], motion = ground_motion(feet, leg);
-      const hxPlane ahead = hx_plane_add(aims(model, paths, leg),
-                                         hx_scaled(motion, model->landing_lead + lift[leg]));
-      place[leg] = hx_plane_sub(time < lift[leg] + model->swing_time ? p : ahead,
-                                hx_scaled(motion, time));
+      const hxPlane ahead =
+          hx_plane_add(aims(model, paths, leg), hx_scaled(motion, model->landing_lead + lift[leg]));
+      place[leg] =
+          hx_plane_sub(time < lift[leg] + model->swing_time ? p : ahead, hx_scaled(motion, time));
       stands[leg] = leg != swings && !paths->clock.absent[leg];
     }
     const double steps = nearbyint(time / model->period);

@@ -148,8 +148,8 @@ HX_SELDOM static void hx_gait_clock_keep_down(const hxGaitClockModel *model,
   const int dropped = hx_gait_clock_drops(clock);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double phase = hx_gait_clock_phase(model, leg, clock->before);
-    const int leaving = phase >= hx_gait_clock_unloads(model) && phase < model->duty &&
-                        !kept[leg] && !dropped;
+    const int leaving =
+        phase >= hx_gait_clock_unloads(model) && phase < model->duty && !kept[leg] && !dropped;
     clock->stays[leg] = (!clock->swinging[leg] && !leaving) || clock->absent[leg];
     clock->lifted[leg] &= !clock->stays[leg];
   }

@@ -101,8 +101,8 @@ static inline void hx_leg_solver_load_torques(const hxLegSolver *model,
   const double a = angle[1] + model->femur_tilt, b = angle[1] - angle[2] + model->tibia_tilt;
   const hxPlane tibia = hx_scaled(hx_cis(b), model->tibia),
                 arm = hx_plane_add(hx_scaled(hx_cis(a), model->femur), tibia),
-                plane = hx_times(hx_plane(force[0], force[1]),
-                                 hx_cis(-(model->hip_yaw + angle[0]))),
+                plane =
+                    hx_times(hx_plane(force[0], force[1]), hx_cis(-(model->hip_yaw + angle[0]))),
                 foot = {model->coxa_length + arm.x, model->offset_y}, inner = {plane.x, force[2]};
   torque[0] = -hx_across(foot, plane);
   torque[1] = -hx_across(arm, inner);
