@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import ctypes as ct
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -138,12 +139,13 @@ class Batch(Closing):
         message = ct.create_string_buffer(MESSAGE_SIZE)
         self._library = environments_library()
         self._owned.handle = self._library.hx_environments_create(
-            ct.byref(native), ct.byref(arrays), self.count, message
+            ct.byref(native), ct.byref(arrays), self.count, self.threads, message
         )
         if not self._owned.handle:
             got = message.value.decode(errors="replace")
             raise FmuError("the environments cannot be created", got=got, fix="use fewer")
-        self._owned.serve(self.threads - 1)
+        if self.threads > 1:
+            self._owned.pool = ThreadPoolExecutor(self.threads - 1)
 
     def _allocate(self) -> None:
         """Allocates the arrays that are exchanged with C."""
@@ -244,8 +246,8 @@ class Batch(Closing):
         numbers = None if seeds is None else np.array(seeds, dtype=np.uint64)
         starting = np.ones(self.count, np.uint8) if mask is None else checked_mask(mask, self.count)
         for _ in range(STARTS):
-            self._library.hx_environments_reset(
-                self._handle(),
+            self._on_all_parts(
+                self._library.hx_environments_reset,
                 starting.ctypes.data,
                 None if numbers is None else numbers.ctypes.data,
             )
@@ -261,7 +263,19 @@ class Batch(Closing):
 
         An environment whose action is not finite does not step: it is `refused`.
         """
-        self._library.hx_environments_step(self._handle())
+        self._on_all_parts(self._library.hx_environments_step)
+
+    def _on_all_parts(self, call: Callable[..., None], *given: int | None) -> None:
+        """Calls a function of the library for each part, in a thread for each."""
+        handle, pool = self._handle(), self._owned.pool
+        if pool is None or self._owned.is_inherited:
+            for part in range(self.threads):
+                call(handle, part, *given)
+            return
+        others = [pool.submit(call, handle, part, *given) for part in range(1, self.threads)]
+        call(handle, 0, *given)
+        for other in others:
+            other.result()
 
     def message(self, index: int) -> str:
         """Returns the last message of an environment's FMUs."""
