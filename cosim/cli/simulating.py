@@ -9,21 +9,20 @@ from typing import Any
 
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
+    DRAWING,
     RunOptions,
     Words,
     check_accuracy,
     chosen_controls,
     default_folder,
-    drawing,
     run_into,
-    show_accuracy,
     show_rows,
     titled,
 )
-from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_text, warn
-from hexapod_cosim.cosim.report.tables import metric_rows, with_errors
+from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_text, waiting, warn
+from hexapod_cosim.cosim.report.tables import about_accuracy, metric_rows, with_errors
 from hexapod_cosim.cosim.report.writing import write_report
-from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
+from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.folder import (
     ACCURACY,
@@ -65,7 +64,8 @@ class Simulated:
         checked = {} if self.accuracy is None else {facts.control: self.accuracy}
         rows = metric_rows(metrics, net_slip=has_net_slip(self.result.parameters))
         show_rows(with_errors(rows, checked), [facts.control])
-        show_accuracy(rows, checked, metrics)
+        if checked:
+            show_text(about_accuracy(checked))
         show_text(f"walk: {facts.walking.text}")
         show_files(self.files)
 
@@ -80,8 +80,6 @@ def simulate_each(
     """
     plan = titled(load_scenario(name, overrides=words.settings), words.settings)
     controls = chosen_controls(words.controls or [plan.control], plan)
-    if words.accuracy:
-        halved_scenario(plan)  # raises errors before anything is run
     folder, done = output or default_folder(name), dict[str, Simulated]()
     command = words.command("simulate", name)
     for control in controls:
@@ -109,11 +107,11 @@ def _simulate(
         result, files = run_into(plan, [folder], command, options)
         label = result.facts.control
         if check:
-            found = check_accuracy([plan], [summarise(result)], folder.path, options)
+            found = check_accuracy([plan], [summarise(result)], options)
             write_accuracy(folder.path, found.as_table())
             accuracies = {label: found}
         if plan.outputs.plots:
-            with drawing(folder.path):
+            with waiting(DRAWING):
                 runs = {label: stored_result(result)}
                 files += write_report(runs, folder.path, warn=warn, accuracies=accuracies)
     return Simulated(result, path, files, accuracies.get(label))
