@@ -51,8 +51,8 @@ from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
 from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant, run_surface
 from hexapod_cosim.cosim.scenario.controls import control_of
-from hexapod_cosim.cosim.scenario.events import event_log
 from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.cosim.scenario.sections import event_log
 from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.surface import Surface
 

@@ -1,5 +1,4 @@
-import { byId, element } from "../../../cosim/viewer/src/dom";
-import { fixed } from "../../../cosim/viewer/src/panels/heading";
+import { byId, element, fixed } from "../../../cosim/viewer/src/dom";
 import { bodyCommand, type Drive } from "./drive";
 import type { Connection, State } from "./link";
 import {

@@ -1,5 +1,5 @@
 import uPlot from "uplot";
-import { fixed, type Labelled, makeFigure } from "../../../cosim/viewer/src/panels/heading";
+import { fixed, type Labelled, makeFigure } from "../../../cosim/viewer/src/dom";
 import { property, quietAxis } from "../../../cosim/viewer/src/theme";
 import { type Frame, footForces, speedOf } from "./messages";
 

@@ -1,8 +1,7 @@
 import uPlot from "uplot";
 import type { Clock } from "../clock";
-import { element } from "../dom";
+import { element, fixed, type Labelled, makeFigure } from "../dom";
 import { property, quietAxis } from "../theme";
-import { fixed, type Labelled, makeFigure } from "./heading";
 
 /** The interval of time that a group of plots shows; it moves on with the replay, page by page. */
 export class Span {
