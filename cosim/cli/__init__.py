@@ -40,8 +40,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _explained(error: Exception) -> str:
     """Returns the message for an error that is none of ours, such as one of the system."""
+    from hexapod_cosim.models.errors import shortened
+
     kind = "" if isinstance(error, OSError) else f"unexpected {type(error).__name__}: "
-    return f"{kind}{error}; run `hexapod --debug ...` to see where"
+    return f"{kind}{shortened(str(error))}; run `hexapod --debug ...` to see where"
 
 
 def _wants_json(given: Sequence[str]) -> bool:
