@@ -1,5 +1,5 @@
 """Writes documentation/index.html of an FMU, and draws a robot: for model.png and the icon of its
-FMU, and for frames of a walk.
+FMU.
 
 Links are thick lines and the torso is a box, drawn from the farthest to the nearest. All
 coordinates are in camera axes (x right, y up, z towards the eye).
@@ -40,7 +40,7 @@ COLOURS = {
 }
 
 Colour = tuple[int, ...]
-CLEAR, WHITE = (0, 0, 0, 0), (255, 255, 255, 255)
+CLEAR = (0, 0, 0, 0)
 INTERFACES = {"CoSimulation": "co-simulation", "ModelExchange": "model exchange"}
 
 
@@ -80,48 +80,43 @@ class Shape:
     radius: float = 0.0
 
 
-@dataclass(frozen=True)
-class View:
-    """Size of a picture in pixels, length of a pixel [m], and the point in its middle [m]."""
-
-    width: int
-    height: int
-    pitch: float
-    middle: Array
-
-    def draw(self, shapes: Iterable[Shape], *, background: Colour = CLEAR) -> Image.Image:
-        """Draws shapes over each other on a background."""
-        image = Image.new("RGBA", (SAMPLES * self.width, SAMPLES * self.height), background)
-        pen, scale, middle = ImageDraw.Draw(image), SAMPLES / self.pitch, 0.5 * np.array(image.size)
-        for shape in shapes:
-            offset = scale * (shape.points[:, :2] - self.middle) * (1.0, -1.0)
-            points = [(float(x), float(y)) for x, y in middle + offset]
-            radius = scale * shape.radius
-            if radius == 0.0:
-                pen.polygon(points, fill=shape.colour)
-                continue
-            pen.line(points, fill=shape.colour, width=round(2.0 * radius))
-            for x, y in points:
-                end = (x - radius, y - radius, x + radius, y + radius)
-                pen.ellipse(end, fill=shape.colour)
-        return image.reduce(SAMPLES)
-
-
 @lru_cache(maxsize=8)
 def draw_robot(robot: Robot, *, width: int, height: int) -> bytes:
     """Draws the standing robot as a PNG with a transparent background.
 
     Width and height are in pixels. Raises RobotError when the robot cannot stand.
     """
-    camera = camera_axes()
-    shapes = robot_shapes(robot, *settled(robot), camera)
-    view = _view_of(shapes, width, height)
+    camera = _camera_axes()
+    shapes = _robot_shapes(robot, *settled(robot), camera)
+    corners = np.concatenate(
+        [shape.points[:, :2] + reach for shape in shapes for reach in (-shape.radius, shape.radius)]
+    )
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    image = Image.new("RGBA", (SAMPLES * width, SAMPLES * height), CLEAR)
+    scale = SAMPLES / (MARGIN * float(np.max((high - low) / (width, height))))  # pixels per metre
+    origin = 0.5 * np.array(image.size) - scale * 0.5 * (low + high) * (1.0, -1.0)
+    pen = ImageDraw.Draw(image)
+    for shape in [*_shadows(shapes, camera), *shapes]:
+        _draw(pen, shape, origin, scale)
     data = io.BytesIO()
-    view.draw([*shadows(shapes, camera), *shapes]).save(data, "PNG", optimize=True)
+    image.reduce(SAMPLES).save(data, "PNG", optimize=True)
     return data.getvalue()
 
 
-def camera_axes() -> Array:
+def _draw(pen: ImageDraw.ImageDraw, shape: Shape, origin: Array, scale: float) -> None:
+    """Draws a shape at a scale [pixels per metre] with its origin at a pixel."""
+    places = origin + scale * shape.points[:, :2] * (1.0, -1.0)
+    points = [(float(x), float(y)) for x, y in places]
+    radius = scale * shape.radius
+    if radius == 0.0:
+        pen.polygon(points, fill=shape.colour)
+        return
+    pen.line(points, fill=shape.colour, width=round(2.0 * radius))
+    for x, y in points:
+        pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=shape.colour)
+
+
+def _camera_axes() -> Array:
     """Returns the camera axes (rows) in world axes."""
     toward = np.array(
         [
@@ -134,7 +129,7 @@ def camera_axes() -> Array:
     return np.array([right, np.cross(toward, right), toward])
 
 
-def robot_shapes(
+def _robot_shapes(
     robot: Robot, position: Array, quaternion: Array, angle: Array, camera: Array
 ) -> list[Shape]:
     """Returns links and the torso's visible faces, the farthest first.
@@ -160,7 +155,7 @@ def _link(robot: Robot, leg: int, joint: int, body: Array, camera: Array) -> Sha
     start = body[:3] - turn @ np.array(link.com)
     along = turn @ np.array(link.tip)
     slope = float(along @ LIGHT) / (float(np.linalg.norm(along)) or 1.0)
-    colour = lit(COLOURS[("coxa", "femur", "tibia")[joint]], math.sqrt(max(1.0 - slope**2, 0.0)))
+    colour = _lit(COLOURS[("coxa", "femur", "tibia")[joint]], math.sqrt(max(1.0 - slope**2, 0.0)))
     radius = THICKNESS[joint] * robot.legs[leg].links[0].length
     return Shape(np.array([start, start + along]) @ camera.T, colour, radius)
 
@@ -173,12 +168,12 @@ def _faces(robot: Robot, middle: Array, turn: Array, camera: Array) -> list[Shap
         first, second = half[:, axis - 2], half[:, axis - 1]
         corners = [-first - second, first - second, first + second, second - first]
         points = middle + side * half[:, axis] + np.array(corners)
-        colour = lit(COLOURS["torso"], side * float(turn[:, axis] @ LIGHT))
+        colour = _lit(COLOURS["torso"], side * float(turn[:, axis] @ LIGHT))
         found.append(Shape(points @ camera.T, colour))
     return found
 
 
-def shadows(shapes: Iterable[Shape], camera: Array) -> list[Shape]:
+def _shadows(shapes: Iterable[Shape], camera: Array) -> list[Shape]:
     """Returns the shadows of shapes on the plane z = 0 of the world."""
     up, lamp = camera[:, 2], camera @ LIGHT
     return [
@@ -191,17 +186,7 @@ def shadows(shapes: Iterable[Shape], camera: Array) -> list[Shape]:
     ]
 
 
-def lit(colour: Sequence[float], cosine: float) -> Colour:
+def _lit(colour: Sequence[float], cosine: float) -> Colour:
     """Returns the colour of a surface from the cosine of its angle to the light."""
     brightness = AMBIENT + (1.0 - AMBIENT) * max(cosine, 0.0)
     return tuple(round(brightness * one) for one in colour)
-
-
-def _view_of(shapes: Iterable[Shape], width: int, height: int) -> View:
-    """Returns the view in which shapes fill a picture."""
-    corners = np.concatenate(
-        [shape.points[:, :2] + reach for shape in shapes for reach in (-shape.radius, shape.radius)]
-    )
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    pitch = MARGIN * float(np.max((high - low) / (width, height)))
-    return View(width, height, pitch, 0.5 * (low + high))
