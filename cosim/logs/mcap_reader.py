@@ -1,6 +1,6 @@
 """Reads MCAP files: our recordings bit for bit, and the ROS 2 topics of robots.
 
-The topics are told apart by the type of their messages and by their names. A topic of joint states
+The topics are distinguished by the type of their messages and by their names. A topic of joint states
 whose name contains "command" or "desired" holds commands, any other one measurements. The measured
 joint states give the times of the rows; commands hold until the next one, and readings of other
 sensors are interpolated linearly between their own times.
