@@ -38,11 +38,9 @@ ROOMS = {
     "report": [*LOW, "export", "results"],
     "run": RUNNING,
 }
-COMPONENTS = (
-    "plant_fmu",
-    "controller/fmu",
-    "extensions/gym/policy_fmu",
-)
+# the components of FMUs; an extension may have been deleted
+POLICY = "extensions/gym/policy_fmu"
+COMPONENTS = ("plant_fmu", "controller/fmu", *([POLICY] if (ROOT / POLICY).is_dir() else []))
 # third-party packages by folder; cosim may use what pyproject lists
 MAY_USE = {
     "models": {"numpy", "PIL"},
@@ -170,7 +168,7 @@ def test_a_core_includes_itself_its_header_and_the_c_library(component: str) -> 
         "controller/fmu": {
             *("controller.h", "generated/controller_settings.h", *SHARED_HEADERS),
         },
-        "extensions/gym/policy_fmu": {"policy.h", *SHARED_HEADERS},
+        POLICY: {"policy.h", *SHARED_HEADERS},
     }
     own |= {f"hexapod/{name}" for name in public[component]}
     files = c_files(*folders, component=component)
