@@ -212,8 +212,7 @@ def test_the_loops_see_the_standard_and_nothing_of_the_fmus_they_drive(
     own |= {"hexapod/shared_work.h", "hexapod/status.h", "hexapod/message.h"}
     for path in files:
         included = set(INCLUDE.findall(path.read_text(encoding="utf-8")))
-        threads = {"pthread.h", "windows.h"} if path.name == "pool.h" else set()
-        foreign = included - own - threads - {"fmi2FunctionTypes.h"} - STANDARD_C
+        foreign = included - own - {"fmi2FunctionTypes.h"} - STANDARD_C
         assert not foreign, f"{path.relative_to(ROOT)} includes {sorted(foreign)}"
 
 
