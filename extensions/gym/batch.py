@@ -12,6 +12,7 @@ import weakref
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -139,7 +140,7 @@ class Batch(Closing):
         message = ct.create_string_buffer(MESSAGE_SIZE)
         self._library = environments_library()
         self._owned.handle = self._library.hx_environments_create(
-            ct.byref(native), ct.byref(arrays), self.count, self.threads, message
+            ct.byref(native), ct.byref(arrays), self.count, message
         )
         if not self._owned.handle:
             got = message.value.decode(errors="replace")
@@ -246,7 +247,7 @@ class Batch(Closing):
         numbers = None if seeds is None else np.array(seeds, dtype=np.uint64)
         starting = np.ones(self.count, np.uint8) if mask is None else checked_mask(mask, self.count)
         for _ in range(STARTS):
-            self._on_all_parts(
+            self._in_threads(
                 self._library.hx_environments_reset,
                 starting.ctypes.data,
                 None if numbers is None else numbers.ctypes.data,
@@ -263,17 +264,17 @@ class Batch(Closing):
 
         An environment whose action is not finite does not step: it is `refused`.
         """
-        self._on_all_parts(self._library.hx_environments_step)
+        self._in_threads(self._library.hx_environments_step)
 
-    def _on_all_parts(self, call: Callable[..., None], *given: int | None) -> None:
-        """Calls a function of the library for each part, in a thread for each."""
+    def _in_threads(self, call: Callable[..., None], *given: int | None) -> None:
+        """Calls a function of the library in all threads, each with a share of the robots."""
         handle, pool = self._handle(), self._owned.pool
         if pool is None or self._owned.is_inherited:
-            for part in range(self.threads):
-                call(handle, part, *given)
+            call(handle, 0, self.count, *given)
             return
-        others = [pool.submit(call, handle, part, *given) for part in range(1, self.threads)]
-        call(handle, 0, *given)
+        ends = [self.count * share // self.threads for share in range(self.threads + 1)]
+        others = [pool.submit(call, handle, *share, *given) for share in pairwise(ends[1:])]
+        call(handle, 0, ends[1], *given)
         for other in others:
             other.result()
 

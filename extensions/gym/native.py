@@ -63,7 +63,7 @@ class Owned:
     """
 
     handle: int | None = None  # of hxEnvironments
-    pool: ThreadPoolExecutor | None = None  # that steps all parts but the first
+    pool: ThreadPoolExecutor | None = None  # of all threads but the calling one
     plant: Fmu | None = None
     process: int = field(default_factory=os.getpid)  # that made them
 

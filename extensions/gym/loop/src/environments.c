@@ -1,4 +1,4 @@
-/* environments.c - many environments in parts. */
+/* environments.c - many environments. */
 #include "hexapod/environments.h"
 
 #include <math.h>
@@ -14,8 +14,6 @@ struct hxEnvironments {
   size_t count, size; /* environments, values in an observation */
   hxEnvironment *environment;
   double *drawn;
-  size_t parts;
-  hxEnvWork *work; /* [parts] */
 };
 
 /* ----------------------------------------------------------------------------------------------
@@ -28,32 +26,27 @@ size_t hx_environments_settings_size(void) { return sizeof(hxEnvSettings); }
 static void free_memory(hxEnvironments *all) {
   free(all->environment);
   free(all->drawn);
-  for (size_t part = 0; all->work && part < all->parts; ++part) free(all->work[part].block);
-  free(all->work);
   free(all);
 }
 
-static hxEnvironments *allocate(const hxEnvSettings *settings, size_t n, size_t parts) {
+static hxEnvironments *allocate(const hxEnvSettings *settings, size_t n) {
   hxEnvironments *all = calloc(1, sizeof *all);
   if (!all) return NULL;
   all->environment = calloc(n ? n : 1, sizeof *all->environment);
   all->drawn = calloc(n * settings->draws.count + 1, sizeof *all->drawn);
-  all->work = calloc(parts, sizeof *all->work);
-  all->parts = parts;
-  if (all->environment && all->drawn && all->work) return all;
+  if (all->environment && all->drawn) return all;
   free_memory(all);
   return NULL;
 }
 
 hxEnvironments *hx_environments_create(const hxEnvSettings *settings, const hxEnvArrays *arrays,
-                                       size_t n, size_t parts, char *message) {
-  hxEnvironments *all = allocate(settings, n, parts);
+                                       size_t n, char *message) {
+  hxEnvironments *all = allocate(settings, n);
   snprintf(message, HX_MESSAGE_SIZE, "%s", all ? "" : "out of memory; use fewer environments");
   if (!all) return NULL;
   all->settings = *settings;
   all->arrays = *arrays;
   all->size = hx_environments_observed(settings);
-  for (size_t part = 0; part < parts; ++part) all->work[part] = hx_environment_work(settings);
   for (; all->count < n; ++all->count) {
     hxEnvironment *environment = &all->environment[all->count];
     double *drawn = all->drawn + all->count * settings->draws.count;
@@ -150,29 +143,28 @@ static void step_one(const hxEnvironments *all, size_t i) {
 }
 
 /* ----------------------------------------------------------------------------------------------
- * work on a part */
+ * work on a share of them, whose plants use one work space by turns */
 
-/* Returns the first environment of a part. */
-static size_t first_of(const hxEnvironments *all, size_t part) {
-  return all->count * part / all->parts;
-}
-
-void hx_environments_reset(hxEnvironments *all, size_t part, const uint8_t *mask,
+void hx_environments_reset(hxEnvironments *all, size_t first, size_t end, const uint8_t *mask,
                            const uint64_t *seed) {
-  for (size_t i = first_of(all, part); i < first_of(all, part + 1); ++i) {
+  const hxEnvWork work = hx_environment_work(&all->settings);
+  for (size_t i = first; i < end; ++i) {
     if (mask && !mask[i]) continue;
-    hx_environment_use(&all->environment[i], &all->work[part]);
+    hx_environment_use(&all->environment[i], &work);
     reset_one(all, i, seed);
     hx_environment_use(&all->environment[i], NULL);
   }
+  free(work.block);
 }
 
-void hx_environments_step(hxEnvironments *all, size_t part) {
-  for (size_t i = first_of(all, part); i < first_of(all, part + 1); ++i) {
-    hx_environment_use(&all->environment[i], &all->work[part]);
+void hx_environments_step(hxEnvironments *all, size_t first, size_t end) {
+  const hxEnvWork work = hx_environment_work(&all->settings);
+  for (size_t i = first; i < end; ++i) {
+    hx_environment_use(&all->environment[i], &work);
     step_one(all, i);
     hx_environment_use(&all->environment[i], NULL);
   }
+  free(work.block);
 }
 
 /* ----------------------------------------------------------------------------------------------

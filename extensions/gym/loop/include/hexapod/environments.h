@@ -5,9 +5,11 @@
  * Environments share nothing: what one does depends on its seed, its episode and its actions alone,
  * so that results are the same bits for any number of threads, any batch and any order.
  *
- * The library creates no threads. The environments are divided into parts, and a caller may step
- * each part in a thread of its own. An FMU whose binary has the functions of shared_work.h uses the
- * work space of its part, from just before to just after the step.
+ * An FMU whose binary has the functions of shared_work.h uses a work space of the call of reset or
+ * step, from just before to just after its own step.
+ *
+ * The library creates no threads. Several threads of a caller may each reset or step a share of the
+ * environments, from `first` to before `end`.
  *
  * SI units, frames and orders as in hexapod.h.
  */
@@ -162,7 +164,7 @@ typedef struct hxEnvironments hxEnvironments;
 
 /* Number of the layout of hxEnvSettings, hxEnvArrays, the structures in them and the lists of names
  * above. A change of their members, or of what a member means, increases it. */
-#define HX_ENVIRONMENTS_LAYOUT 5
+#define HX_ENVIRONMENTS_LAYOUT 4
 
 /* Layout and size of hxEnvSettings in this library, with which callers check their own. */
 HX_API int hx_environments_layout(void);
@@ -171,21 +173,21 @@ HX_API size_t hx_environments_settings_size(void);
 /* Returns the number of values in an observation. */
 HX_API size_t hx_environments_observed(const hxEnvSettings *settings);
 
-/* Creates n environments that are not reset yet, in at least one part. NULL when an FMU refuses an
- * instance; message (HX_MESSAGE_SIZE bytes) then says why. */
+/* Creates n environments that are not reset yet. NULL when an FMU refuses an instance; message
+ * (HX_MESSAGE_SIZE bytes) then says why. */
 HX_API hxEnvironments *hx_environments_create(const hxEnvSettings *settings,
-                                              const hxEnvArrays *arrays, size_t n, size_t parts,
-                                              char *message);
+                                              const hxEnvArrays *arrays, size_t n, char *message);
+
 HX_API void hx_environments_destroy(hxEnvironments *environments);
 
-/* Starts an episode in the environments of a part that are in the mask ([n], NULL: all). seed: [n]
+/* Starts an episode in the environments of a share that are in the mask ([n], NULL: all). seed: [n]
  * restarts the episodes of these environments from these seeds; NULL: their next episodes.
  * Environments whose FMU refuses to start have the reason HX_END_FAILED. */
-HX_API void hx_environments_reset(hxEnvironments *environments, size_t part, const uint8_t *mask,
-                                  const uint64_t *seed);
+HX_API void hx_environments_reset(hxEnvironments *environments, size_t first, size_t end,
+                                  const uint8_t *mask, const uint64_t *seed);
 
-/* Steps the environments of a part. */
-HX_API void hx_environments_step(hxEnvironments *environments, size_t part);
+/* Steps the environments of a share. */
+HX_API void hx_environments_step(hxEnvironments *environments, size_t first, size_t end);
 
 /* Returns the last message of an environment's FMUs, "" before any. */
 HX_API const char *hx_environments_message(const hxEnvironments *environments, size_t index);
