@@ -48,12 +48,13 @@ def simulate(
     """Run one co-simulation: results, metrics, plots. Several controls: a run of each. SCENARIO may
     be a package (.ssp) of a plant and a controller.
     """
-    from hexapod_cosim.cosim.cli.packages import read_package
     from hexapod_cosim.cosim.cli.running import RunOptions, Words
     from hexapod_cosim.cosim.cli.simulating import simulate_each
-    from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 
     if scenario.endswith(".ssp"):
+        from hexapod_cosim.cosim.cli.packages import read_package
+        from hexapod_cosim.cosim.common.temporary import TemporaryFolder
+
         with TemporaryFolder("package") as folder:
             package = read_package(Path(scenario), folder)
             settings = [*package.settings, *(settings or [])]

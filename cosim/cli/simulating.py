@@ -22,7 +22,6 @@ from hexapod_cosim.cosim.cli.running import (
 )
 from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_text, warn
 from hexapod_cosim.cosim.report.tables import metric_rows, with_errors
-from hexapod_cosim.cosim.report.writing import write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
 from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.folder import (
@@ -113,6 +112,8 @@ def _simulate(
             write_accuracy(folder.path, found.as_table())
             accuracies = {label: found}
         if plan.outputs.plots:
+            from hexapod_cosim.cosim.report.writing import write_report
+
             with drawing(folder.path):
                 runs = {label: stored_result(result)}
                 files += write_report(runs, folder.path, warn=warn, accuracies=accuracies)
