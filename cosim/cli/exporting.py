@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import typer
@@ -18,8 +18,6 @@ from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.cosim.scenario.records import CHOSEN, OWN
 from hexapod_cosim.models import HexapodError, Robot, load_robot, unknown_name
 from hexapod_cosim.models.mjcf import robot_to_mjcf
-from hexapod_cosim.models.records import Servo
-from hexapod_cosim.models.servos.motor import has_measured_friction
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
 
@@ -27,15 +25,13 @@ from hexapod_cosim.models.urdf.writer import robot_to_urdf
 class Format:
     """A file format of robots."""
 
-    name: str
-    title: str
     suffix: str
     write: Callable[[Robot], str]
 
 
 FORMATS = {
-    "urdf": Format("urdf", "a URDF", ".urdf", robot_to_urdf),
-    "mjcf": Format("mjcf", "an MJCF file", ".xml", robot_to_mjcf),
+    "urdf": Format(".urdf", robot_to_urdf),
+    "mjcf": Format(".xml", robot_to_mjcf),
 }
 DEFAULT_CONTROL = "compliant"  # of a package
 SUFFIXES = {**{name: form.suffix for name, form in FORMATS.items()}, "ssp": ".ssp"}
@@ -153,13 +149,7 @@ def _in_stance(robot: Robot, stance: str) -> tuple[Robot, Gait | None]:
 
 def _export_description(robot: Robot, output: Path | None, form: Format) -> Path:
     """Writes a robot's URDF or MJCF file and returns its path."""
-    path = export_description(robot, _path(output, robot.name, form.suffix), form)
-    lost = left_out(robot.servo, form)
-    if lost:
-        warn(
-            f"{path.name}: {form.title} cannot say and leaves out of the servos: {', '.join(lost)}"
-        )
-    return path
+    return export_description(robot, _path(output, robot.name, form.suffix), form)
 
 
 def _export_plant(robot: Robot, request: Request) -> Path:
@@ -226,21 +216,6 @@ def _controller_setup(
     for warning in setup.build().warnings:
         warn(warning)
     return setup
-
-
-def left_out(servo: Servo, form: Format) -> list[str]:
-    """Returns what a format cannot say of the servos, and a robot's file can."""
-    viscous = form.name == "mjcf"  # which has it as the joint's damping
-    load = replace(servo, viscous_friction=0.0) if viscous else servo
-    facts = {
-        "friction that depends on load and speed": has_measured_friction(load),
-        "the limits of the motor's voltage": servo.drive == "motor",
-        "heat": servo.drive == "motor" and servo.winding_capacity > 0.0,
-        "the supply's resistance": servo.drive == "motor" and servo.supply_resistance > 0.0,
-        "the bus and the steps of commands": servo.bus_period > 0.0 or servo.command_step > 0.0,
-        "the rotors' angular momentum": servo.gear_ratio != 0.0,
-    }
-    return [name for name, present in facts.items() if present]
 
 
 def export_description(robot: Robot, path: str | Path, form: Format) -> Path:

@@ -282,7 +282,7 @@ def extra_members(
 
 def pictures(interface: Interface, *, fmi: int = 2) -> dict[str, bytes]:
     """Returns the robot's picture and icon by path in the archive."""
-    from hexapod_cosim.cosim.export.picture import draw_robot  # noqa: PLC0415
+    from hexapod_cosim.cosim.export.documentation import draw_robot  # noqa: PLC0415
 
     sizes = {PICTURES[fmi]: PICTURE_SIZE, f"{FOLDER}/{ICON}": ICON_SIZE}
     return {

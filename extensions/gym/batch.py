@@ -1,4 +1,4 @@
-"""Runs many environments in C (loop/src/environments.c), over threads.
+"""Runs many environments in C (loop/src/environments.c), in threads that share them.
 
 `Batch` owns the plant's FMU, the memory that is exchanged with C and the threads. An action array
 goes in, arrays of observations, rewards and flags come out; all of them are views of the memory
@@ -143,7 +143,7 @@ class Batch(Closing):
         if not self._owned.handle:
             got = message.value.decode(errors="replace")
             raise FmuError("the environments cannot be created", got=got, fix="use fewer")
-        self._owned.serve(self.threads - 1)
+        self._owned.count, self._owned.threads = self.count, self.threads
 
     def _allocate(self) -> None:
         """Allocates the arrays that are exchanged with C."""
@@ -244,7 +244,8 @@ class Batch(Closing):
         numbers = None if seeds is None else np.array(seeds, dtype=np.uint64)
         starting = np.ones(self.count, np.uint8) if mask is None else checked_mask(mask, self.count)
         for _ in range(STARTS):
-            self._library.hx_environments_reset(
+            self._owned.call(
+                self._library.hx_environments_reset,
                 self._handle(),
                 starting.ctypes.data,
                 None if numbers is None else numbers.ctypes.data,
@@ -261,7 +262,7 @@ class Batch(Closing):
 
         An environment whose action is not finite does not step: it is `refused`.
         """
-        self._library.hx_environments_step(self._handle())
+        self._owned.call(self._library.hx_environments_step, self._handle())
 
     def message(self, index: int) -> str:
         """Returns the last message of an environment's FMUs."""

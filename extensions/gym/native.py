@@ -5,9 +5,12 @@ from __future__ import annotations
 import ctypes as ct
 import os
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
+from itertools import pairwise
 from pathlib import Path
+from queue import SimpleQueue
 
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
@@ -55,6 +58,16 @@ def environments_library() -> ct.CDLL:
     return load_loop("environments", "hx_environments_settings_size", "hxEnvSettings", HEADER)
 
 
+Job = Callable[[], None]
+
+
+def work(jobs: SimpleQueue[Job | None], done: SimpleQueue[None]) -> None:
+    """Does jobs until there is None; the thread of a batch."""
+    while (job := jobs.get()) is not None:
+        job()
+        done.put(None)
+
+
 @dataclass
 class Owned:
     """Threads, environments and the plant's FMU of one batch.
@@ -63,20 +76,34 @@ class Owned:
     """
 
     handle: int | None = None  # of hxEnvironments
-    servers: list[threading.Thread] = field(default_factory=list)
+    count: int = 1  # of environments
+    threads: int = 1  # that share the environments, with the calling one
+    workers: list[threading.Thread] = field(default_factory=list)
+    jobs: SimpleQueue[Job | None] = field(default_factory=SimpleQueue)
+    done: SimpleQueue[None] = field(default_factory=SimpleQueue)
     plant: Fmu | None = None
     process: int = field(default_factory=os.getpid)  # that made them
 
-    def serve(self, count: int) -> None:
-        """Starts a number of threads that work for the environments."""
-        for _ in range(count):
-            server = threading.Thread(
-                target=environments_library().hx_environments_serve,
-                args=(self.handle,),
-                daemon=True,
+    def call(self, function: Callable[..., None], handle: int, *given: int | None) -> None:
+        """Calls a function in C for all environments, in each thread with a share of them.
+
+        In a process that was forked from the one that made the threads it uses the calling one
+        alone.
+        """
+        if self.threads == 1 or os.getpid() != self.process:
+            function(handle, 0, self.count, *given)
+            return
+        while len(self.workers) < self.threads - 1:
+            self.workers.append(
+                threading.Thread(target=work, args=(self.jobs, self.done), daemon=True)
             )
-            server.start()
-            self.servers.append(server)
+            self.workers[-1].start()
+        ends = [self.count * share // self.threads for share in range(self.threads + 1)]
+        for first, end in pairwise(ends[1:]):
+            self.jobs.put(partial(function, handle, first, end, *given))
+        function(handle, 0, ends[1], *given)
+        for _ in self.workers:
+            self.done.get()
 
     def free(self) -> None:
         """Ends the threads and frees the environments; may be called twice.
@@ -88,11 +115,12 @@ class Owned:
         if os.getpid() != self.process:
             return
         if handle:
-            environments_library().hx_environments_stop(handle)
-            for server in self.servers:
-                server.join()
+            for _ in self.workers:
+                self.jobs.put(None)
+            for worker in self.workers:
+                worker.join()
             environments_library().hx_environments_destroy(handle)
         if self.plant:
             self.plant.close()
-        self.servers.clear()
+        self.workers.clear()
         self.plant = None

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.report.geometry import describe_ground, describe_shape, pack_surface
 from hexapod_cosim.cosim.results.window import robot_weight
-from hexapod_cosim.extensions.live.pacing import Pacer
 from hexapod_cosim.extensions.live.robot import LiveRobot
 from hexapod_cosim.models import LEG_NAMES, Robot
 from hexapod_cosim.models.ground.faces import surface_of
@@ -50,13 +49,12 @@ def describe_world(robot: Robot, parameters: Mapping[str, float], step: float) -
     }
 
 
-def frame_of(robot: LiveRobot, pacer: Pacer) -> dict[str, Any]:
-    """Returns pose, motion, forces and lateness as of now (viewer/messages.ts)."""
+def frame_of(robot: LiveRobot) -> dict[str, Any]:
+    """Returns pose, motion and forces as of now (viewer/messages.ts)."""
     return {key: _rounded(_values(robot, names)) for key, names in SHOWN.items()} | {
         "time": round(robot.time, 6),
         "force": _rounded(_values(robot, FORCES) / robot.weight),
         "push": _rounded(robot.signals.push[:3]),
-        "late": {"factor": round(pacer.factor, 4), "skipped": round(pacer.skipped, 3)},
     }
 
 

@@ -17,7 +17,7 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.run import plan
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.extensions.live import realtime, server
-from hexapod_cosim.extensions.live.pacing import Pacer
+from hexapod_cosim.extensions.live.loop import Pacer
 from hexapod_cosim.extensions.live.realtime import facts_of, goal_met, measure, table_of
 from hexapod_cosim.extensions.live.settings import Choices
 from hexapod_cosim.models import HexapodError, Robot
