@@ -89,18 +89,23 @@ def headline(comparison: Comparison) -> list[Part]:
         return [*falls, Part(". No pair of walks can be compared.")]
     against = f"gainst {first} control, {second}"
     begin = [*falls, Part(f". Where both walked, a{against}")] if falls else [Part(f"A{against}")]
-    gains, losses = _largest(comparison, BETTER), _largest(comparison, WORSE)
+    return effects(comparison.changes, begin)
+
+
+def effects(changes: Mapping[str, Change], begin: list[Part]) -> list[Part]:
+    """Returns a sentence that begins with some parts and names the largest of the changes."""
+    gains, losses = _largest(changes, BETTER), _largest(changes, WORSE)
     if not gains and not losses:
-        return _no_change(comparison, begin)
+        return _no_change(changes, begin)
     begin += [Part(" walks with " if gains else " brings "), *_listed(gains or losses)]
     if gains and losses:
         begin += [Part(", and costs "), *_listed(losses)]
     return [*begin, Part(".")]
 
 
-def _known(comparison: Comparison) -> set[str]:
+def _known(changes: Mapping[str, Change]) -> set[str]:
     """Returns the metrics that the runs have; those per radian instead of those per metre."""
-    known = {name for name, change in comparison.changes.items() if change.pairs}
+    known = {name for name, change in changes.items() if change.pairs}
     return known - {radian for metre, radian in PER_RADIAN.items() if metre in known}
 
 
@@ -142,9 +147,9 @@ def _falls(comparison: Comparison) -> list[Part]:
     return [start, begin, Part(" and under "), end, Part(" runs")]
 
 
-def _no_change(comparison: Comparison, begin: list[Part]) -> list[Part]:
+def _no_change(changes: Mapping[str, Change], begin: list[Part]) -> list[Part]:
     """Returns the sentence for runs that differ in no metric that it can name."""
-    if not any(comparison.changes[name].pairs for name in CARDS):
+    if not _known(changes) & CARDS.keys():
         text = (
             "The walk was too short to measure: "
             "figures are of whole gait cycles after the first two."
@@ -153,12 +158,12 @@ def _no_change(comparison: Comparison, begin: list[Part]) -> list[Part]:
     return [*begin, Part(" control changes nothing that these runs could tell.")]
 
 
-def _largest(comparison: Comparison, verdict: str) -> list[Part]:
+def _largest(changes: Mapping[str, Change], verdict: str) -> list[Part]:
     """Returns the largest changes with a verdict, by their ratio, as parts of the sentence."""
     found = {
         name: change
-        for name, change in comparison.changes.items()
-        if name in _known(comparison) & PHRASES.keys()
+        for name, change in changes.items()
+        if name in _known(changes) & PHRASES.keys()
         and change.verdict == verdict
         and math.isfinite(change.relative)
     }
@@ -186,11 +191,11 @@ def _listed(parts: list[Part]) -> list[Part]:
     return joined
 
 
-def cards(comparison: Comparison) -> list[Card]:
+def cards(changes: Mapping[str, Change]) -> list[Card]:
     """Returns the cards of the metrics in CARDS that the runs have."""
-    known = _known(comparison)
+    known = _known(changes)
     return [
-        _card(text, METRICS[name][0], comparison.changes[name])
+        _card(text, METRICS[name][0], changes[name])
         for name, (text, _) in CARDS.items()
         if name in known
     ]

@@ -242,7 +242,7 @@ def _comparison(comparison: Comparisons, facts: RunFacts) -> dict[str, Any]:
     return {
         "headline": headline(main),
         "headlines": [headline(pair) for pair in comparison.pairs if pair is not main],
-        "cards": cards(main),
+        "cards": cards(main.changes),
         "columns": comparison.labels,
         "compared": [pair.title for pair in comparison.pairs],
         "rows": rows,

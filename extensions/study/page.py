@@ -10,6 +10,7 @@ from typing import Any
 
 from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.master.loop import COMPLETED
+from hexapod_cosim.cosim.report.headline import Part, cards, effects
 from hexapod_cosim.cosim.report.page import embedded, render
 from hexapod_cosim.cosim.report.tables import number, shown_change
 from hexapod_cosim.cosim.results.comparison import METHOD
@@ -140,7 +141,6 @@ def _shown_figure(name: str, value: float | None) -> str:
 
 
 REPORT, FIGURES_FOLDER = "report.html", "plots"
-HEADLINES = ("slip_per_metre", "cost_of_transport")  # metrics whose changes come first
 TOO_SHORT = (
     "too short for figures, which are of whole gait cycles after the second: set a longer duration."
 )
@@ -155,7 +155,9 @@ def write_study_report(results: Results, folder: Path) -> list[Path]:
         package=__package__,
         controls=results.study.controls,
         results=results,
-        cards=cards(results),
+        headline=headline(results),
+        cards={name: cards(changes) for name, changes in results.overall.changes.items()},
+        walks=shown_walks(results),
         overall=overall_table(results),
         meanings={name: meaning for name, (_, _, meaning) in METRICS.items()},
         points=point_table(results),
@@ -171,20 +173,20 @@ def write_study_report(results: Results, folder: Path) -> list[Path]:
     return [folder / SUMMARY, *files, folder / REPORT]
 
 
-def cards(results: Results) -> list[tuple[str, str, str, str]]:
-    """Returns name, value, what it is of and verdict of the figures at the top of the page."""
+def headline(results: Results) -> list[Part]:
+    """Returns the headline: the largest changes to the second control, or how many runs walked."""
+    overall, controls = results.overall, results.study.controls
+    if len(controls) > 1 and overall.pairs[controls[1]]:
+        return effects(
+            overall.changes[controls[1]], [Part(f"Against {controls[0]} control, {controls[1]}")]
+        )
+    return [Part(f"Walked to the end: {shown_walks(results)}.")]
+
+
+def shown_walks(results: Results) -> str:
+    """Returns how many runs walked to their end, by control."""
     overall = results.overall
-    found = [
-        (name, f"{overall.walked[name]} / {runs}", "walked to the end", "")
-        for name, runs in overall.runs.items()
-    ]
-    for name in HEADLINES:
-        for control, changes in overall.changes.items():
-            change, interval, verdict = shown_change(changes[name]).values()
-            if change:
-                of = f"95 %: {interval}, {changes[name].pairs} pairs"
-                found.append((f"{name.replace('_', ' ')}, {control}", change, of, verdict))
-    return found
+    return ", ".join(f"{name} {overall.walked[name]} of {n}" for name, n in overall.runs.items())
 
 
 def notes(results: Results) -> Iterator[str]:

@@ -52,6 +52,7 @@ from hexapod_cosim.extensions.study.page import (
     notes,
     optimum_table,
     overall_table,
+    shown_walks,
     write_study_report,
 )
 from hexapod_cosim.extensions.study.reading import load_study
@@ -158,13 +159,11 @@ def report_on(folder: Path) -> tuple[Results, list[Path]]:
 
 def show_study(found: Results) -> None:
     """Prints the table of all runs, totals, failures by reason and the optimum."""
-    overall, controls = found.overall, found.study.controls
     _show(overall_table(found))
-    walked = ", ".join(
-        f"{control} {overall.walked[control]} of {overall.runs[control]}" for control in controls
+    show_text(
+        f"{found.runs} runs at {found.of_points} points; walked to the end: {shown_walks(found)}"
     )
-    show_text(f"{found.runs} runs at {found.of_points} points; walked to the end: {walked}")
-    if len(controls) > 1:
+    if len(found.study.controls) > 1:
         show_text(f"{METHOD}.")
     for count, control, how, reason in failure_table(found).rows[:MAX_REASONS]:
         show_text(f"{count:>6} x {control} {how}: {reason}")

@@ -64,7 +64,7 @@ def test_the_headline_tells_gains_and_costs_and_marks_them() -> None:
 
 
 def test_slip_which_an_assumed_slope_makes_comes_last_and_with_a_note() -> None:
-    assert [card.name for card in cards(comparison({}))][-1] == "slip per metre"
+    assert [card.name for card in cards(comparison({}).changes)][-1] == "slip per metre"
     facts: Any = SimpleNamespace(parameters={"friction.law": 1.0})
     assert "friction.slope" in creep_note(facts)
 
@@ -118,10 +118,10 @@ def test_the_headline_of_a_robot_that_turns_on_the_spot_is_per_radian() -> None:
         "and costs 2.0 times the motor work per radian."
     )
     assert ("slip per radian", "1.00 → 0.250 mm/rad") not in [
-        (card.name, card.values) for card in cards(result)
+        (card.name, card.values) for card in cards(result.changes)
     ]
     assert ("slip per radian", "1000 → 250 mm/rad") in [
-        (card.name, card.values) for card in cards(result)
+        (card.name, card.values) for card in cards(result.changes)
     ]
 
 
@@ -180,7 +180,7 @@ def test_cards_show_units_that_people_read_and_the_interval() -> None:
         {"slip_per_metre": 0.3, "height_rms": 9.1e-4},
         {"slip_per_metre": 0.03, "height_rms": 4.56e-5},
     )
-    height, *_, slip = cards(comparison(after, before=before))
+    height, *_, slip = cards(comparison(after, before=before).changes)
     assert (slip.change, slip.values, slip.interval) == (
         "−90.0 %",
         "300 → 30.0 mm/m",
@@ -191,7 +191,8 @@ def test_cards_show_units_that_people_read_and_the_interval() -> None:
         "0.910 → 0.046 mm",
         "better",
     )
-    assert all(card.interval == "" for card in cards(comparison({"slip_per_metre": 0.5}, seeds=1)))
+    single = comparison({"slip_per_metre": 0.5}, seeds=1)
+    assert all(card.interval == "" for card in cards(single.changes))
 
 
 def facts_of(control: str, simulated: float, *, speed: float) -> Any:
