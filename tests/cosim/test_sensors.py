@@ -274,7 +274,7 @@ def test_events_are_described_in_order_and_survive_a_scenario_file() -> None:
         "{time=1.1, sensor='angle', leg='LM', joint='coxa', fault='stuck'}, "
         "{time=1.2, sensor='attitude', fault='dead'}, "
         "{time=1.3, leg='LM', fault='late', delay='20 ms', duration=2}, "
-        "{time=2, leg='RF', joint='coxa', fault='dead', duration=0.5}, "
+        "{time=2, leg='RF', joint='coxa', fault='limp', duration=0.5}, "
         "{time=2.5, duration=0.1, force=[0, 40, 0]}, "
         "{time=2.6, duration=0.1, lost='command'}, {time=3.5, leg='LM', fault='stuck'}"
     )
