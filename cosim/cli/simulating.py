@@ -12,7 +12,6 @@ from xml.etree import ElementTree
 
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
-    DRAWING,
     RunOptions,
     Words,
     check_accuracy,
@@ -123,7 +122,7 @@ def _simulate(
             write_accuracy(folder.path, found.as_table())
             accuracies = {label: found}
         if plan.outputs.plots:
-            with waiting(DRAWING):
+            with waiting("drawing figures and report"):
                 runs = {label: stored_result(result)}
                 files += write_report(runs, folder.path, warn=warn, accuracies=accuracies)
     return Simulated(result, path, files, accuracies.get(label))
