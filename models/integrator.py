@@ -282,7 +282,7 @@ def end_step(start: Start, h: float, trial: Trial) -> State:
     """
     robot, state, contacts = start.robot, start.state, start.state.contacts
     before, after = (depths_of(robot, body, contacts) for body in (state.body, trial.body))
-    yielded = replace(contacts, soil_depth=yield_soil(robot, contacts, h, before, after))
+    yielded = replace(contacts, plastic=yield_soil(robot, contacts, h, before, after))
     moved = cross_cells(robot, trial.body, yielded, after)
     depths = depths_of(robot, trial.body, moved)
     switched, touchdowns = switch_contacts(robot, trial.body, moved, depths)

@@ -50,7 +50,6 @@ from hexapod_cosim.models.kinematics import BODIES, JOINTS, LEGS, joint_angles, 
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.servos.motor import friction_drag, has_measured_friction
 from hexapod_cosim.models.soil.law import (
-    body_shear_drag,
     shear_limit,
     soil_normal_force,
     soil_normal_slopes,
@@ -114,9 +113,7 @@ def keep_slopes(
     for k, point, state, contact in closed_contacts(robot, body, contacts):
         turn = body[point.sphere.body, 10:13]
         if state.is_soft:
-            found[k] = soil_slopes(
-                robot, point, state, float(contacts.soil_depth[k]), contact, ahead
-            )
+            found[k] = soil_slopes(robot, state, float(contacts.plastic[k]), contact, ahead)
         else:
             deflection = bristle[point.leg] if point.is_sole else np.zeros(3)
             found[k] = rigid_slopes(robot, point, state, contact, deflection, turn, ahead)
@@ -168,24 +165,13 @@ def rigid_slopes(
 
 
 def soil_slopes(
-    robot: Robot,
-    point: Candidate,
-    state: ContactState,
-    plastic: float,
-    contact: FootContact,
-    ahead: float,
+    robot: Robot, state: ContactState, plastic: float, contact: FootContact, ahead: float
 ) -> ContactSlopes:
-    """Returns the derivatives of a sphere on soil at plastic depth z_p [m]; its moments have
-    none.
-    """
-    soil, foot, depth = (state.soil, point.shape(robot, state.side), expected_depth(contact, ahead))
+    """Returns the derivatives of a foot on soil at plastic depth z_p [m]; its moments have none."""
+    soil, foot, depth = state.soil, robot.foot, expected_depth(contact, ahead)
     at = (soil, foot, plastic, depth, contact.approach_speed)
     limit = shear_limit(soil, foot, max(depth, plastic), soil_normal_force(*at))
-    slip_speed = float(np.linalg.norm(slip_velocity(contact)))
-    if not point.is_sole:
-        along = body_shear_drag(state.friction, limit, slip_speed)
-        return ContactSlopes(*soil_normal_slopes(*at), drag=along)
-    yielding = slip_speed / soil.shear_displacement
+    yielding = float(np.linalg.norm(slip_velocity(contact))) / soil.shear_displacement
     shear = limit / soil.shear_displacement
     return ContactSlopes(*soil_normal_slopes(*at), drag=0.0, bristle=shear, beta=yielding)
 

@@ -11,8 +11,6 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
-from hexapod_cosim.cosim.cli.terminal import fitted
-
 SUCCESS, FAILURE, USAGE, FELL, INTERRUPT = 0, 1, 2, 3, 130
 EXIT_CODES = {
     SUCCESS: "success",
@@ -49,7 +47,7 @@ def report_failure(
 
     error: its attributes go into the JSON object, and so do the entries of its attribute `found`.
     """
-    print(fitted(f"hexapod: {text}", sys.stderr), file=sys.stderr)
+    print(f"hexapod: {text}", file=sys.stderr)
     if as_json:
         print(json.dumps(error_object(text, code, error), indent=2, ensure_ascii=False))
     return code

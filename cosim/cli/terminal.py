@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import math
 import os
 import sys
-import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stdout
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import typer
 
 GAP = 2  # between columns, in characters
-NARROWEST = 20  # width of a column of text that is broken into lines, in characters
+WIDEST = 1000  # of a table elsewhere than on a terminal
 EVERY = 30.0  # s    between two lines of progress in a log
 
 Show = Callable[[float, str], None]  # amount done, text behind the bar
 Count = Callable[..., None]  # number of runs done, number of failed ones
-
-USUAL = 80  # characters; where the width is unknown
-LEAST = 20
-INDENT = "  "  # of the continuation of a wrapped line
 
 STDOUT, STDERR = 1, 2  # descriptors
 
@@ -70,59 +64,33 @@ def show_files(files: Iterable[Path]) -> None:
 
 
 def show_text(text: str) -> None:
-    """Prints sentences, wrapped between words on a terminal."""
-    print(fitted(text, sys.stdout), flush=True)  # a program may wait for the line
+    """Prints sentences."""
+    print(text, flush=True)  # a program may wait for the line
 
 
 def show_table(
     columns: Sequence[str], rows: Iterable[Sequence[str]], *, right: Sequence[int] = ()
 ) -> None:
-    """Prints an aligned table; `right` are the indices of right-aligned columns.
+    """Prints an aligned table, whose cells are wrapped on a terminal that is too narrow.
 
-    On a terminal that is too narrow, the last column is wrapped if it is text, the gaps between
-    columns shrink, or the remaining columns follow in another table below the first column.
+    right: the indices of right-aligned columns.
     """
-    lines = [list(columns), *map(list, rows)]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    room, last = columns_of(sys.stdout) or sum(widths) + GAP * len(widths), len(columns) - 1
-    if last not in right:  # text, which may be wrapped
-        before = sum(widths[:last]) + GAP * last
-        widths[last] = min(widths[last], max(room - before, NARROWEST))
-    gap = 1 if sum(widths) + last <= room < sum(widths) + GAP * last else GAP
-    for number, block in enumerate(_blocks(widths, room, gap)):
-        if number:
-            print()
-        for line in lines:
-            cells = [_cell(line[k], widths[k], right=k in right) for k in block]
-            height = max(map(len, cells))
-            for k in range(height):
-                parts = [
-                    cell[k] if k < len(cell) else " " * widths[column]
-                    for column, cell in zip(block, cells, strict=True)
-                ]
-                print((" " * gap).join(parts).rstrip())
+    from rich.console import Console
+    from rich.table import Table
 
-
-def _cell(text: str, width: int, *, right: bool) -> list[str]:
-    """Returns the lines of a cell."""
-    parts = textwrap.wrap(text, width) if len(text) > width else [text]
-    return [part.rjust(width) if right else part.ljust(width) for part in parts]
-
-
-def _blocks(widths: Sequence[int], room: int, gap: int) -> list[list[int]]:
-    """Returns the columns of each table; all but the first begin with column 0."""
-    blocks = [[0]]
-    for k in range(1, len(widths)):
-        used = sum(widths[place] + gap for place in blocks[-1])
-        if len(blocks[-1]) > 1 and used + widths[k] > room:
-            blocks.append([0])
-        blocks[-1].append(k)
-    return blocks
+    table = Table(box=None, pad_edge=False, padding=(0, GAP, 0, 0), header_style="")
+    for k, name in enumerate(columns):
+        table.add_column(name, justify="right" if k in right else "left", overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    width = None if sys.stdout.isatty() else WIDEST
+    plain: dict[str, Any] = {"markup": False, "highlight": False, "color_system": None}
+    Console(file=sys.stdout, width=width, **plain).print(table)
 
 
 def warn(text: str) -> None:
     """Prints a warning on stderr."""
-    print(fitted(f"warning: {text}", sys.stderr), file=sys.stderr)
+    print(f"warning: {text}", file=sys.stderr)
 
 
 @contextmanager
@@ -137,39 +105,15 @@ def waiting(label: str | None) -> Iterator[None]:
         yield
 
 
-class _Pace:
-    """Progress per second since the first report, and the time that is left."""
-
-    def __init__(self, total: float) -> None:
-        self._total = total
-        self._first: tuple[float, float] | None = None  # time [s] and amount
-
-    def __call__(self, done: float) -> tuple[float, str]:
-        """Returns the rate and a text on the time left, both unknown at first."""
-        now = monotonic()
-        begun, already = self._first = self._first or (now, done)
-        rate = (done - already) / (now - begun) if now > begun else 0.0
-        if done >= self._total:
-            return rate, f"in {_clock(now - begun)}"
-        return rate, f"{_clock((self._total - done) / rate)} left" if rate else ""
-
-
-def _clock(seconds: float) -> str:
-    minutes, rest = divmod(math.ceil(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
-
-
 @contextmanager
 def _bar(label: str, total: float) -> Iterator[Show]:
     """Shows a progress bar on the terminal, on one line."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn
-    from rich.table import Column
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import TimeRemainingColumn as TimeLeft
 
-    behind = TextColumn("{task.fields[text]}", table_column=Column(no_wrap=True))
-    columns = (TextColumn("{task.description:<12}"), BarColumn(), behind)
-    with Progress(*columns, console=Console(stderr=True)) as bar:
+    columns = (TextColumn("{task.description:<12}"), BarColumn(), TextColumn("{task.fields[text]}"))
+    with Progress(*columns, TimeElapsedColumn(), TimeLeft(), console=Console(stderr=True)) as bar:
         task = bar.add_task(label, total=total, text="")
         yield lambda done, text: bar.update(task, completed=done, text=text)
 
@@ -194,14 +138,8 @@ def progress_bar(label: str, duration: float) -> Iterator[Callable[[float], None
     if not sys.stderr.isatty():
         yield None
         return
-    pace = _Pace(duration)
     with _bar(label, duration) as show:
-
-        def report(time: float) -> None:
-            rate, left = pace(time)
-            show(time, f"{time:5.1f} of {duration:g} s  {rate:4.0f} x real time  {left}")
-
-        yield report
+        yield lambda time: show(time, f"{time:.1f} of {duration:g} s")
 
 
 @contextmanager
@@ -214,43 +152,13 @@ def counting_bar(label: str, total: int, *, plain: bool = False) -> Iterator[Cou
     if not on_terminal and not plain:
         yield lambda done, failed=0: None
         return
-    pace = _Pace(total)
     with _bar(label, total) if on_terminal else _log_lines(label) as show:
 
         def report(done: int, failed: int = 0) -> None:
-            rate, left = pace(done)
-            lost = [f"{failed} failed"] if failed else []
-            texts = [f"{done} of {total} runs", f"{60.0 * rate:.0f} a minute", left, *lost]
-            show(done, ", ".join(filter(None, texts)))
+            lost = f", {failed} failed" if failed else ""
+            show(done, f"{done} of {total} runs{lost}")
 
         yield report
-
-
-def columns_of(stream: TextIO) -> int | None:
-    """Returns the width of a stream's terminal, or None if it is none; COLUMNS overrides it."""
-    if not stream.isatty():
-        return None
-    given = os.environ.get("COLUMNS", "")
-    if given.isdecimal() and int(given):
-        return max(int(given), LEAST)
-    try:
-        return max(os.get_terminal_size(stream.fileno()).columns, LEAST)
-    except (OSError, ValueError):  # no real terminal
-        return USUAL
-
-
-def fitted(text: str, stream: TextIO) -> str:
-    """Returns text wrapped for this stream; words, such as paths, stay whole."""
-    width = columns_of(stream)
-    if width is None:
-        return text
-    wrapped = (
-        textwrap.wrap(
-            line, width, subsequent_indent=INDENT, break_long_words=False, break_on_hyphens=False
-        )
-        for line in text.split("\n")
-    )
-    return "\n".join("\n".join(lines) for lines in wrapped)
 
 
 @contextmanager

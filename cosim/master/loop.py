@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.interrupts import Watch, interruptible, watched
+from hexapod_cosim.cosim.master.interrupts import interruptible
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording, Rows
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.scenario.schedule import Schedule
@@ -26,7 +26,6 @@ from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError
 COMPLETED, FAILED, INTERRUPTED = "completed", "failed", "interrupted"
 FAULTY = tuple(f"controller.{leg}.{j}.faulty" for j in JOINT_NAMES for leg in LEG_NAMES)
 PROGRESS_STEPS = 20  # macro-steps between two calls of the progress function
-TIME_LIMIT = 60.0  # s    wall time of one call of a controller; twice as much at most
 
 Progress = Callable[[float], None]  # simulated time since the start [s]
 
@@ -71,17 +70,16 @@ def run(
     *,
     h: float,
     progress: Progress | None = None,
-    time_limit: float = TIME_LIMIT,
 ) -> Outcome:
     """Runs an initialised plant under a controller over the whole schedule in macro-steps of h [s].
 
-    A refused step, any exception of the controller, a call of the controller that takes longer than
-    time_limit [s of wall time] and an interrupt end the run; the outcome tells which.
+    A refused step, any exception of the controller and an interrupt end the run; the outcome says
+    which.
     """
     status, reason, begin, cause = COMPLETED, "", perf_counter(), None
     try:
-        with interruptible(), watched(time_limit) as watch:
-            _loop(plant, signals, controller, schedule, recorder, watch, h=h, progress=progress)
+        with interruptible():
+            _loop(plant, signals, controller, schedule, recorder, h=h, progress=progress)
     except KeyboardInterrupt:
         status, reason = INTERRUPTED, "interrupted"
     except Exception as error:  # a controller may raise anything; the recorded rows are kept
@@ -135,7 +133,6 @@ def _loop(
     controller: JointController,
     schedule: Schedule,
     recorder: Recorder,
-    watch: Watch,
     *,
     h: float,
     progress: Progress | None,
@@ -152,9 +149,7 @@ def _loop(
         while tunings and tunings[-1][0] == k:
             _, name, value = tunings.pop()
             plant.set_parameters({name: value})
-        watch.call = k + 1
         joints = controller.step(t, command, measurement)
-        watch.call = 0
         is_lost = lost is not None and lost[k]
         macro_step(plant.step, signals, None if is_lost else joints, t, h, recorder.record)
         if progress is not None and k % PROGRESS_STEPS == 0:

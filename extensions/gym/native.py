@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes as ct
 import os
-import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -63,36 +63,27 @@ class Owned:
     """
 
     handle: int | None = None  # of hxEnvironments
-    servers: list[threading.Thread] = field(default_factory=list)
+    pool: ThreadPoolExecutor | None = None  # of all threads but the calling one
     plant: Fmu | None = None
     process: int = field(default_factory=os.getpid)  # that made them
 
-    def serve(self, count: int) -> None:
-        """Starts a number of threads that work for the environments."""
-        for _ in range(count):
-            server = threading.Thread(
-                target=environments_library().hx_environments_serve,
-                args=(self.handle,),
-                daemon=True,
-            )
-            server.start()
-            self.servers.append(server)
+    @property
+    def is_inherited(self) -> bool:
+        """Whether this process was forked from the one that made them: it has no threads."""
+        return os.getpid() != self.process
 
     def free(self) -> None:
         """Ends the threads and frees the environments; may be called twice.
 
-        In a process that was forked from the one that made them it frees nothing: the threads do
-        not exist there, and the unpacked files belong to the first process.
+        An inherited batch frees nothing: the unpacked files belong to the first process.
         """
         handle, self.handle = self.handle, None
-        if os.getpid() != self.process:
+        if self.is_inherited:
             return
+        if self.pool:
+            self.pool.shutdown()
         if handle:
-            environments_library().hx_environments_stop(handle)
-            for server in self.servers:
-                server.join()
             environments_library().hx_environments_destroy(handle)
         if self.plant:
             self.plant.close()
-        self.servers.clear()
         self.plant = None

@@ -4,16 +4,16 @@ asked for, and publishes its state.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from time import monotonic, sleep
 from typing import Any
 
 from hexapod_cosim.controller import BodyCommand
-from hexapod_cosim.extensions.live import state
+from hexapod_cosim.extensions.live import page
 from hexapod_cosim.extensions.live.messages import Action, Change, Drive, Leg, Message, Push
-from hexapod_cosim.extensions.live.pacing import Pacer
-from hexapod_cosim.extensions.live.recording import NO_FORCE, Force, Recording
+from hexapod_cosim.extensions.live.recording import LONGEST, NO_FORCE, Force, Recording
 from hexapod_cosim.extensions.live.robot import MOST_WEIGHTS, LiveRobot
 from hexapod_cosim.models import HexapodError
 
@@ -21,8 +21,56 @@ FRAME = 0.02  # s    between two states that are published
 SILENCE = 1.0  # s    after which a drive or push that was not renewed ends
 IDLE = 0.05  # s    between two looks for messages while the loop pauses
 MOST_WAITING = 200  # messages; more are dropped
+MOST_LAG = 0.1  # s    behind wall time
+WINDOW = 1.0  # s    over which the real-time factor is taken
 
 Publish = Callable[[str, Any], None]  # kind and content of a message for all pages
+
+
+class Pacer:
+    """Computes the time to wait before a macro-step of `h` [s]; `now` returns wall time [s].
+
+    Step k is due to begin at t_k = origin + k h. A lag of less than MOST_LAG is made up by steps
+    without a pause between them. After a larger one the origin moves: the gap is skipped and
+    counted.
+
+    Attributes:
+        steps: macro-steps since the loop began.
+        skipped: wall time [s] in gaps.
+    """
+
+    def __init__(self, h: float, now: Callable[[], float]) -> None:
+        self._h, self._now = h, now
+        self.steps, self.skipped = 0, 0.0
+        self._ends: deque[float] = deque(maxlen=max(round(WINDOW / h), 2) + 1)
+        self.restart()
+
+    def restart(self) -> None:
+        """Makes the next step due now, after a pause that was asked for; nothing is counted."""
+        self._due = self._now()
+        self._ends.clear()
+
+    def wait(self) -> float:
+        """Returns the time [s] until the next step is due; skips a gap that is too large."""
+        left = self._due - self._now()
+        if left < -MOST_LAG:
+            self.skipped -= left
+            self.restart()
+            return 0.0
+        return max(left, 0.0)
+
+    def note_step(self) -> None:
+        """Notes that the step that was due has ended."""
+        self._due += self._h
+        self.steps += 1
+        self._ends.append(self._now())
+
+    @property
+    def factor(self) -> float:
+        """Simulated time over wall time of the last second; 0 before two steps."""
+        if len(self._ends) < 2 or self._ends[-1] <= self._ends[0]:
+            return 0.0
+        return (len(self._ends) - 1) * self._h / (self._ends[-1] - self._ends[0])
 
 
 class Loop:
@@ -95,7 +143,7 @@ class Loop:
         self.robot.step(self._command, force)
         if self._recording is not None:
             self._recording.note(self._command, force, self.robot.limp)
-            if self.robot.fault or self._recording.is_full:
+            if self.robot.fault or self._recording.duration >= LONGEST:
                 self._end_recording()
         if self.robot.fault != before:
             self._note(self.robot.fault)
@@ -167,7 +215,7 @@ class Loop:
     def _end_recording(self) -> None:
         """Ends a recording and publishes it as a scenario."""
         recording, self._recording = self._recording, None
-        if recording is None or recording.steps == 0:
+        if recording is None or not recording.steps:
             return
         self._saved = recording.as_toml()
         self._publish("recording", self._saved)
@@ -185,7 +233,7 @@ class Loop:
 
     def _world(self) -> dict[str, Any]:
         robot = self.robot
-        return state.describe_world(robot.plan.robot, robot.parameters, robot.h)
+        return page.describe_world(robot.plan.robot, robot.parameters, robot.h)
 
     def _note(self, text: str) -> None:
         """Publishes a sentence."""
@@ -210,8 +258,12 @@ class Loop:
         command = self._command
         self._publish(
             "frame",
-            state.frame_of(self.robot, self.pacer)
+            page.frame_of(self.robot)
             | {
+                "late": {
+                    "factor": round(self.pacer.factor, 4),
+                    "skipped": round(self.pacer.skipped, 3),
+                },
                 "placed": self._placed,
                 "command": [command.vx, command.vy, command.yaw_rate, command.height],
             },

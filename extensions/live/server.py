@@ -2,31 +2,31 @@
 
 The server listens on the loopback address alone. Every address begins with a random token. Requests
 with another token, from another origin or for another host are refused, so that neither programs of
-other users nor pages of other sites reach the robot.
+other users nor pages of other sites reach the robot. A slow page gets fewer states, always the
+newest.
 """
 
 from __future__ import annotations
 
 import asyncio
+import json
+import logging
 import secrets
 import socket
 import sys
 import threading
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from errno import EADDRINUSE
+from http import HTTPStatus
 from typing import Any
 
-import uvicorn
-from starlette.applications import Starlette
-from starlette.middleware import Middleware
-from starlette.requests import HTTPConnection, Request
-from starlette.responses import PlainTextResponse, Response
-from starlette.routing import Route, WebSocketRoute
-from starlette.websockets import WebSocket
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.datastructures import Headers, MultipleValuesError
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.extensions.live.hub import Hub
 from hexapod_cosim.extensions.live.loop import Loop
 from hexapod_cosim.extensions.live.messages import MessageError, read_message
 from hexapod_cosim.extensions.live.page import render_page
@@ -36,23 +36,21 @@ from hexapod_cosim.models import HexapodError
 
 HOST = "127.0.0.1"
 TOKEN_BYTES = 16
+MOST_PAGES = 8
 POLICY = 1008  # WebSocket: closed because of what the page sent
 BUSY = 1013  # WebSocket: try again later
 ENDING = 5.0  # s    until a loop that does not end is left behind
 SWITCH = 5e-4  # s    for which the server's thread may keep the loop's waiting
-UVICORN: dict[str, Any] = {
-    "ws": "websockets-sansio",
-    "ws_max_size": 4096,
-    "ws_max_queue": 16,
-    "log_level": "critical",
-    "access_log": False,
-    "server_header": False,
-    "proxy_headers": False,
-    "timeout_graceful_shutdown": 1,
-    "lifespan": "on",
+SOCKET: dict[str, Any] = {
+    "max_size": 4096,  # bytes of a message
+    "compression": None,
+    "close_timeout": 1,  # s
+    "server_header": None,
+    "logger": logging.Logger("hexapod-live", logging.CRITICAL + 1),  # says nothing
 }
 HEADERS = {
     "cache-control": "no-store",
+    "connection": "close",
     "referrer-policy": "no-referrer",
     "x-content-type-options": "nosniff",
     "cross-origin-resource-policy": "same-origin",
@@ -68,30 +66,27 @@ class LiveError(HexapodError):
     """The live robot cannot be started."""
 
 
-class Guard:
-    """Refuses requests for another host, from another origin or without the token."""
+class Page:
+    """A connected page, and what it is to be sent: the newest message of each kind."""
 
-    def __init__(self, app: Any, port: int, token: str) -> None:
-        self._app, self._token = app, token.encode()
-        self._hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
+    def __init__(self, waiting: dict[str, str]) -> None:
+        self._waiting = waiting
+        self._ready = asyncio.Event()
+        self._ready.set()
 
-    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        """Answers what is refused, and passes on all else."""
-        if scope["type"] == "lifespan" or self._allows(HTTPConnection(scope)):
-            await self._app(scope, receive, send)
-        elif scope["type"] == "websocket":
-            await WebSocket(scope, receive, send).close(POLICY)
-        else:
-            refusal = "use the address that `hexapod live` printed"
-            await PlainTextResponse(refusal, 403, HEADERS)(scope, receive, send)
+    def offer(self, kind: str, text: str) -> None:
+        """Replaces what is to be sent of a kind."""
+        self._waiting[kind] = text
+        self._ready.set()
 
-    def _allows(self, request: HTTPConnection) -> bool:
-        host, origin = request.headers.get("host", ""), request.headers.get("origin")
-        is_socket = request.scope["type"] == "websocket"  # of which browsers always say the origin
-        ours = {f"http://{one}" for one in self._hosts} | (set() if is_socket else {None})
-        token = request.url.path.split("/")[1].encode()
-        # compared in a time that does not depend on how much of the token is right
-        return host in self._hosts and origin in ours and secrets.compare_digest(token, self._token)
+    async def send_all(self, send: Callable[[str], Awaitable[None]]) -> None:
+        """Sends what is offered, until it is cancelled."""
+        while True:
+            await self._ready.wait()
+            self._ready.clear()
+            texts, self._waiting = list(self._waiting.values()), {}
+            for text in texts:
+                await send(text)
 
 
 class LiveServer:
@@ -107,21 +102,17 @@ class LiveServer:
 
     def __init__(self, choices: Choices, gains: Gains | None, *, port: int = 0) -> None:
         self._socket = _bound(port)
-        port, token = self._socket.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES)
-        self.url = f"http://{HOST}:{port}/{token}/"
+        port, self._token = self._socket.getsockname()[1], secrets.token_urlsafe(TOKEN_BYTES)
+        self.url = f"http://{HOST}:{port}/{self._token}/"
+        self._hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
         self._choices, self._gains = choices, gains
-        self._page = render_page(choices)
-        self.hub = Hub()
+        self._html = render_page(choices)
+        self.pages: set[Page] = set()
+        self._newest: dict[str, str] = {}  # by kind, for new pages
+        self._recording = ""  # the last one, as a scenario file
         self._loop: Loop
-        self._events: asyncio.AbstractEventLoop | None = None
-        routes = [
-            Route("/{token}/", self._show),
-            Route("/{token}/scenario.toml", self._save),
-            WebSocketRoute("/{token}/socket", self._talk),
-        ]
-        guard = Middleware(Guard, port=port, token=token)
-        app = Starlette(routes=routes, middleware=[guard], lifespan=self._lifespan)
-        self._server = uvicorn.Server(uvicorn.Config(app, **UVICORN))
+        self._events: asyncio.AbstractEventLoop
+        self._end = asyncio.Event()
 
     def run(self, ready: Callable[[str], None] = lambda url: None) -> None:
         """Serves until Ctrl-C; `ready` gets the page's address.
@@ -132,16 +123,23 @@ class LiveServer:
         try:
             with LiveRobot(self._choices, gains=self._gains) as robot:
                 self._loop = Loop(robot, self._publish)
-                thread = threading.Thread(target=self._run_loop, daemon=True, name="hexapod-live")
-                thread.start()
-                try:
-                    ready(self.url)
-                    self._server.run(sockets=[self._socket])
-                finally:
-                    self._loop.ended = True
-                    thread.join(ENDING)
+                with asyncio.Runner() as runner:
+                    self._events = runner.get_loop()
+                    runner.run(self._serve(ready))
         finally:
             self._socket.close()
+
+    async def _serve(self, ready: Callable[[str], None]) -> None:
+        thread = threading.Thread(target=self._run_loop, daemon=True, name="hexapod-live")
+        answer = self._answer
+        async with serve(self._talk, sock=self._socket, process_request=answer, **SOCKET):
+            thread.start()
+            try:
+                ready(self.url)
+                await self._end.wait()
+            finally:
+                self._loop.ended = True
+                thread.join(ENDING)
 
     def _run_loop(self) -> None:
         """Runs the loop; when it ends by itself, the server ends too."""
@@ -152,51 +150,82 @@ class LiveServer:
 
     def stop(self) -> None:
         """Ends `run`, from any thread."""
-        self._server.should_exit = True
+        with suppress(RuntimeError):  # it has just ended
+            self._events.call_soon_threadsafe(self._end.set)
 
     def _publish(self, kind: str, content: Any) -> None:
         """Passes a message of the loop's thread to the pages."""
-        if self._events is None:
-            self.hub.publish(kind, content)  # kept for the first page
-        else:
-            with suppress(RuntimeError):  # the server has just ended
-                self._events.call_soon_threadsafe(self.hub.publish, kind, content)
+        with suppress(RuntimeError):  # the server has just ended
+            self._events.call_soon_threadsafe(self._offer, kind, content)
 
-    @asynccontextmanager
-    async def _lifespan(self, _app: Any) -> AsyncIterator[None]:
-        self._events = asyncio.get_running_loop()
-        yield
+    def _offer(self, kind: str, content: Any) -> None:
+        """Offers a message to all pages, and to new ones unless it is a note."""
+        if kind == "recording":
+            self._recording = content
+            return
+        text = json.dumps({"type": kind, **content}, separators=(",", ":"))
+        if kind != "note":
+            self._newest[kind] = text
+        for page in self.pages:
+            page.offer(kind, text)
 
-    async def _show(self, _request: Request) -> Response:
-        return Response(self._page, headers=HEADERS, media_type="text/html")
+    def _answer(self, _connection: ServerConnection, request: Request) -> Response | None:
+        """Answers a request; returns None for that of a socket, which may be opened."""
+        token, _, name = request.path[1:].partition("?")[0].partition("/")
+        if not self._allows(request.headers, token, is_socket=name == "socket"):
+            return _response(HTTPStatus.FORBIDDEN, "use the address that `hexapod live` printed")
+        if name == "socket":
+            return None
+        if name == "":
+            return _response(HTTPStatus.OK, self._html, kind="text/html")
+        if name != "scenario.toml" or not self._recording:
+            return _response(HTTPStatus.NOT_FOUND, "nothing is recorded yet")
+        file = {"content-disposition": 'attachment; filename="driven.toml"'}
+        return _response(HTTPStatus.OK, self._recording, kind="application/toml", more=file)
 
-    async def _save(self, _request: Request) -> Response:
-        """Answers with the last recording as a scenario file."""
-        if not self.hub.recording:
-            return PlainTextResponse("nothing is recorded yet", 404, HEADERS)
-        name = {"content-disposition": 'attachment; filename="driven.toml"'}
-        return Response(self.hub.recording, headers=HEADERS | name, media_type="application/toml")
+    def _allows(self, headers: Headers, token: str, *, is_socket: bool) -> bool:
+        try:
+            host, origin = headers.get("host", ""), headers.get("origin")
+        except MultipleValuesError:
+            return False
+        # browsers always say the origin of a socket
+        ours = {f"http://{one}" for one in self._hosts} | (set() if is_socket else {None})
+        # compared in a time that does not depend on how much of the token is right
+        right = secrets.compare_digest(token.encode(), self._token.encode())
+        return host in self._hosts and origin in ours and right
 
-    async def _talk(self, connection: WebSocket) -> None:
+    async def _talk(self, connection: ServerConnection) -> None:
         """Serves a page's socket until one side ends the connection."""
-        await connection.accept()
-        client = self.hub.join()
-        if client is None:
+        if len(self.pages) >= MOST_PAGES:
             await connection.close(BUSY, "too many pages")
             return
-        self._loop.pages = len(self.hub.clients)
-        sending = asyncio.ensure_future(client.send_all(connection.send_text))
+        page = Page(dict(self._newest))
+        self.pages.add(page)
+        self._loop.pages = len(self.pages)
+        sending = asyncio.ensure_future(page.send_all(connection.send))
         try:
-            while (message := await connection.receive())["type"] != "websocket.disconnect":
-                self._loop.post(read_message(message.get("text") or message.get("bytes") or ""))
+            async for message in connection:
+                self._loop.post(read_message(message))
         except MessageError as error:
-            await connection.close(POLICY, str(error)[:120])
+            await connection.close(POLICY, error.what)
+        except ConnectionClosed:
+            pass
         finally:
-            self.hub.clients.discard(client)
-            self._loop.pages = len(self.hub.clients)
+            self.pages.discard(page)
+            self._loop.pages = len(self.pages)
             sending.cancel()
-            with suppress(asyncio.CancelledError, Exception):
+            with suppress(asyncio.CancelledError, ConnectionClosed):
                 await sending
+
+
+def _response(
+    status: HTTPStatus, body: str, *, kind: str = "text/plain", more: dict[str, str] | None = None
+) -> Response:
+    """Returns an HTTP response with a text."""
+    content = body.encode()
+    own = {"content-type": f"{kind}; charset=utf-8", "content-length": str(len(content))}
+    headers = Headers({**HEADERS, **own, **(more or {})})
+    return Response(status.value, status.phrase, headers, content)
 
 
 def _bound(port: int) -> socket.socket:

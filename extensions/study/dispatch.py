@@ -20,7 +20,6 @@ from typing import Any
 from hexapod_cosim.cosim.cli.terminal import warn
 from hexapod_cosim.cosim.common.installation import install_extra
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.master.interrupts import remembered_interrupts
 from hexapod_cosim.cosim.run.worker_pool import SerialExecutor, WorkerDiedError, WorkerPool
 from hexapod_cosim.extensions.study.job import Job
 from hexapod_cosim.extensions.study.records import Order, RunResult, StudyError
@@ -34,7 +33,7 @@ from hexapod_cosim.extensions.study.worker import (
 
 MAX_CHUNK = 16  # runs: half a second of work, so that a dead worker loses little
 CHUNKS_PER_WORKER = 2  # a worker that finishes a chunk has the next one already
-CHECK_INTERVAL = 0.5  # s    between checks for interrupts and for workers
+CHECK_INTERVAL = 0.5  # s    between checks for workers
 CONNECT_TIMEOUT = "10s"
 MAX_DEATHS_IN_A_ROW = 10  # chunks: more are not caused by single runs
 FIX_DEATHS = "look for what ends them (memory?); a script needs `if __name__ == '__main__':`"
@@ -55,7 +54,6 @@ class Workers:
     executor: Executor
     size: Callable[[], int]  # number of workers now, at least 1
     deaths: tuple[type[Exception], ...] = ()  # exceptions of a task whose workers died
-    check: Callable[[], None] = lambda: None  # raises KeyboardInterrupt after Ctrl-C
 
 
 @contextmanager
@@ -98,10 +96,9 @@ def cluster_workers(address: str) -> Iterator[Workers]:
     # its tracebacks of a dead scheduler say no more than our error does
     logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)
     try:
-        with remembered_interrupts() as interrupts:
-            if not client.nthreads():
-                warn(f"the cluster has no workers: waiting for some (dask worker {address})")
-            yield Workers(client.get_executor(pure=False), size, (KilledWorker,), interrupts)
+        if not client.nthreads():
+            warn(f"the cluster has no workers: waiting for some (dask worker {address})")
+        yield Workers(client.get_executor(pure=False), size, (KilledWorker,))
     finally:
         client.close(timeout=5)
 
@@ -187,7 +184,6 @@ class _Dispatcher:
                 self.pending[future] = chunk
                 rest -= size
             done, _ = wait(self.pending, timeout=CHECK_INTERVAL, return_when=FIRST_COMPLETED)
-            self._workers.check()
             for future in done:
                 chunk = list(self.pending.pop(future))
                 suspects += [] if self._store(future) else chunk

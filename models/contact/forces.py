@@ -40,12 +40,10 @@ from hexapod_cosim.models.ground.faces import faces_of_feet, ground_face, surfac
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, rotation_matrix
 from hexapod_cosim.models.records import Foot, Robot, Soil
 from hexapod_cosim.models.soil.law import (
-    body_shear_drag,
     shear_force,
     shear_limit,
     shear_rate,
     soil_normal_force,
-    soil_radius,
 )
 
 NEAREST = "nearest"  # face of torso, knees and shanks
@@ -64,21 +62,6 @@ class Candidate:
         """Whether this is a foot on the ground below it, which has bristles."""
         return self.face == TOP
 
-    @property
-    def may_sink(self) -> bool:
-        """Whether this may be on soil: all but walls."""
-        return self.is_sole or self.face == NEAREST
-
-    def shape(self, robot: Robot, side: int) -> Foot:
-        """Returns radius and pad radius of the sphere, as the laws of soil take them.
-
-        side: axis of the torso whose side lies on the soil.
-        """
-        if self.leg >= 0:
-            return robot.foot
-        pad = self.sphere.pads[side].radius if self.sphere.pads else 0.0
-        return replace(robot.foot, radius=self.sphere.radius, pad_radius=pad)
-
 
 @dataclass(frozen=True)
 class ContactState:
@@ -89,7 +72,6 @@ class ContactState:
     soil: Soil
     damping: float = math.nan  # s/m  d of eq. 14; nan: open
     impact_speed: float = 0.0  # m/s  at the last touch-down
-    side: int = 2  # axis of the torso whose side faced the ground at the last touch-down
 
     @property
     def is_open(self) -> bool:
@@ -107,18 +89,11 @@ class Contacts:
     """State of all contacts. It changes at the ends of steps alone."""
 
     states: tuple[ContactState, ...]  # in the order of `candidates`
-    soil_depth: (
-        Array  # (n,) m  depth at which spheres touch soil: z_p, or that of a footprint; else 0
-    )
-    place: Array  # (n, 2) m  where they lost contact with the bottom of their footprints
+    plastic: Array  # (6,) m  depth at which feet touch soil: z_p, or that of a footprint; else 0
+    place: Array  # (6, 2) m  where they lost contact with the bottom of their footprints
     cell: tuple[Cell | None, ...]  # (6,) of blocks, assigned while a foot touches; None: none
     footprints: Array  # (n, 4) m  x, y, depth, radius
     pairs: tuple[ContactState, ...] = ()  # contacts between legs, in the order of `leg_pairs`
-
-    @property
-    def plastic(self) -> Array:
-        """Depths (6,) at which the feet touch soil [m]."""
-        return self.soil_depth[:LEGS]
 
     @property
     def damping(self) -> Array:
@@ -132,7 +107,7 @@ class Contacts:
 
 
 def candidates(robot: Robot) -> tuple[Candidate, ...]:
-    """Returns all contacts: feet face by face, then torso, knees and shanks."""
+    """Returns all contacts: feet face by face, their soles first, then torso, knees and shanks."""
     feet = []
     for face in faces_of_feet(robot.terrain):
         for leg in range(LEGS):
@@ -146,24 +121,8 @@ def candidates(robot: Robot) -> tuple[Candidate, ...]:
 
 def own_ground(robot: Robot, point: Candidate) -> ContactState:
     """Returns an open contact with the ground of the robot file, without the surface's patches."""
-    return ContactState(
-        robot.contact, _friction_of(robot.friction, point), soil_for(robot.soil, robot, point)
-    )
-
-
-def soil_for(soil: Soil, robot: Robot, point: Candidate, side: int = 2) -> Soil:
-    """Returns the soil as a sphere meets it, on a side of the torso; rigid for points without size.
-
-    The laws take b of eq. 40 from the radius of a pad. For the pad of a side of the torso's box,
-    whose b is the side's smaller edge, the cohesive modulus has the ratio of both as a factor.
-    """
-    size = soil_radius(point.shape(robot, side))
-    if not point.may_sink or size <= 0.0:
-        return Soil()
-    if soil.law != "bekker" or not point.sphere.pads or point.sphere.pads[side].breadth <= 0.0:
-        return soil
-    factor = size / point.sphere.pads[side].breadth
-    return replace(soil, cohesive_modulus=factor * soil.cohesive_modulus)
+    soil = robot.soil if point.is_sole else Soil()
+    return ContactState(robot.contact, _friction_of(robot.friction, point), soil)
 
 
 def _friction_of(friction: Friction, point: Candidate) -> Friction:
@@ -175,8 +134,7 @@ def open_contacts(robot: Robot) -> Contacts:
     """Returns the contacts of a robot in the air, over undisturbed ground."""
     states = tuple(own_ground(robot, point) for point in candidates(robot))
     pairs = (open_pair(robot),) * len(leg_pairs(robot))
-    n = len(states)
-    nothing = np.zeros(n), np.zeros((n, 2)), (None,) * LEGS, np.zeros((0, 4))
+    nothing = np.zeros(LEGS), np.zeros((LEGS, 2)), (None,) * LEGS, np.zeros((0, 4))
     return Contacts(states, *nothing, pairs)
 
 
@@ -267,8 +225,8 @@ def shares_of_feet(robot: Robot, found: list[tuple[Candidate, ContactState, Foot
     for leg in range(LEGS):
         places = [
             place
-            for place, (point, state, contact) in enumerate(found)
-            if point.leg == leg and not state.is_soft and contact.penetration > 0.0
+            for place, (point, _, contact) in enumerate(found)
+            if point.leg == leg and contact.penetration > 0.0
         ]
         depth = np.array([found[place][2].penetration for place in places])
         normal = np.array([found[place][2].normal for place in places])
@@ -287,41 +245,30 @@ def _with_share(state: ContactState, share: float) -> ContactState:
 
 
 def contact_load(
-    shape: Foot, state: ContactState, plastic: float, depth: float, approach_speed: float
+    foot: Foot, state: ContactState, plastic: float, depth: float, approach_speed: float
 ) -> float:
     """Returns f_n [N] of a closed contact at a depth [m] and an approach speed [m/s] (eq. 14, 45).
 
-    shape: radius and pad radius of the sphere; plastic: z_p on soil [m].
+    plastic: z_p on soil [m].
     """
     if state.is_soft:
-        return soil_normal_force(state.soil, shape, plastic, depth, approach_speed)
+        return soil_normal_force(state.soil, foot, plastic, depth, approach_speed)
     return normal_force(state.contact, state.damping, depth, approach_speed)
 
 
 def contact_force(
-    shape: Foot,
-    state: ContactState,
-    plastic: float,
-    contact: FootContact,
-    bristle: Array | None,
-    has_bristle: bool = True,
+    foot: Foot, state: ContactState, plastic: float, contact: FootContact, bristle: Array | None
 ) -> Array:
     """Returns the force (3,) of the ground on a sphere [N].
 
     bristle: deflection (3,) of a sole [m]. On soil the depth of shear is not below z_p, so that a
-    foot that leaves the ground within a step keeps its grip to the end of the step. Spheres without
-    a bristle, of torso, knees and shanks, have the whole shear against their slip.
+    foot that leaves the ground within a step keeps its grip to the end of the step.
     """
     depth = contact.penetration
-    load = contact_load(shape, state, plastic, depth, contact.approach_speed)
+    load = contact_load(foot, state, plastic, depth, contact.approach_speed)
     if state.is_soft:
-        limit = shear_limit(state.soil, shape, max(depth, plastic), load)
-        if has_bristle:
-            sideways = shear_force(state.soil, limit, np.zeros(3) if bristle is None else bristle)
-        else:
-            slip = slip_velocity(contact)
-            drag = body_shear_drag(state.friction, limit, float(np.linalg.norm(slip)))
-            sideways = -drag * slip
+        limit = shear_limit(state.soil, foot, max(depth, plastic), load)
+        sideways = shear_force(state.soil, limit, np.zeros(3) if bristle is None else bristle)
     else:
         sideways = friction_force(state.friction, load, slip_velocity(contact), bristle)
     return load * contact.normal + sideways
@@ -337,14 +284,13 @@ def contact_wrenches(
     g = np.zeros((len(body), 6))
     for k, point, state, contact in closed_contacts(robot, body, contacts):
         carrier = body[point.sphere.body]
-        shape = point.shape(robot, state.side) if state.is_soft else robot.foot
-        plastic = float(contacts.soil_depth[k]) if state.is_soft else 0.0
+        plastic = float(contacts.plastic[k]) if state.is_soft else 0.0
         deflection = bristle[point.leg] if bristle is not None and point.is_sole else None
-        force = contact_force(shape, state, plastic, contact, deflection, point.is_sole)
+        force = contact_force(robot.foot, state, plastic, contact, deflection)
         torque = cross(contact.point - carrier[0:3], force)
         if point.leg >= 0:
             depth, speed = contact.penetration, contact.approach_speed
-            load = contact_load(shape, state, plastic, depth, speed)
+            load = contact_load(robot.foot, state, plastic, depth, speed)
             friction, radius = state.friction, robot.foot.radius
             torque += turning_moment(friction, radius, load, contact.normal, carrier[10:13])
         g[point.sphere.body] += np.concatenate([force, torque])

@@ -1,14 +1,12 @@
 """Computes contacts of torso, knees and shanks with the ground.
 
 Each is a sphere with the normal law of the feet (eq. 14) and the friction of the tanh law (eq. 15),
-also where the feet have bristles. The torso has eight, around the corners of a box. On soil knees
-and shanks sink as their spheres, a corner of the torso as a flat pad of a quarter of the side with
-which the box touches down.
+also where the feet have bristles. The torso has eight, around the corners of a box. Soil is rigid
+ground for them.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -28,14 +26,6 @@ from hexapod_cosim.models.records import Robot
 
 
 @dataclass(frozen=True)
-class Pad:
-    """A flat pad as which a corner of the torso sinks into soil."""
-
-    radius: float  # m  of a disc of its area; 0: the sphere
-    breadth: float  # m  b of eq. 40, the smaller edge of its side
-
-
-@dataclass(frozen=True)
 class BodySphere:
     """A sphere of a body that may touch the ground."""
 
@@ -43,7 +33,6 @@ class BodySphere:
     body: int  # number of the body
     centre: Array  # (3,) from the body's centre of mass, body axes [m]
     radius: float  # m
-    pads: tuple[Pad, ...] = ()  # on soil, of the sides along x, y and z; none: the sphere
 
 
 def body_spheres(robot: Robot) -> tuple[BodySphere, ...]:
@@ -60,7 +49,7 @@ def body_spheres(robot: Robot) -> tuple[BodySphere, ...]:
         offset = np.subtract(body.torso_centre, robot.torso.com)
         for z, y, x in product((-1.0, 1.0), repeat=3):
             corner = offset + np.array([x, y, z]) * body.torso_box
-            spheres.append(BodySphere("torso", 0, corner, body.corner_radius, corner_pads(robot)))
+            spheres.append(BodySphere("torso", 0, corner, body.corner_radius))
     for name, radius, share in (
         ("knee", body.knee_radius, 0.0),
         ("shank", body.shank_radius, body.shank_position),
@@ -71,30 +60,6 @@ def body_spheres(robot: Robot) -> tuple[BodySphere, ...]:
             label = f"{robot.legs[leg].name}.{name}"
             spheres.append(BodySphere(label, JOINTS * (leg + 1), centre, radius))
     return tuple(spheres)
-
-
-def corner_pads(robot: Robot) -> tuple[Pad, ...]:
-    """Returns the pads as which a corner of the torso sinks into soil, on the sides of the box
-    along x, y and z.
-
-    Each is a disc of a quarter of its side; the sphere, where that is not smaller.
-    """
-    pads = []
-    for axis in range(3):
-        edges = np.delete(robot.body.torso_box, axis)
-        radius = math.sqrt(float(np.prod(edges)) / math.pi)
-        is_pad = radius > robot.body.corner_radius
-        pads.append(Pad(radius, 2.0 * float(edges.min())) if is_pad else Pad(0.0, 0.0))
-    return tuple(pads)
-
-
-def side_on_ground(robot: Robot, sphere: BodySphere, state: Array) -> int:
-    """Returns the axis (0 to 2) of a body to which its side that faces the ground is normal.
-
-    state: (13,) of the sphere's body.
-    """
-    normal = body_contact(robot, sphere, state).normal
-    return int(np.argmax(np.abs(rotation_matrix(state[3:7]).T @ normal)))
 
 
 def body_contact(robot: Robot, sphere: BodySphere, state: Array) -> FootContact:

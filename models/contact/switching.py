@@ -12,12 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
-from hexapod_cosim.models.contact.footprints import (
-    LEAST_FOOTPRINT,
-    deepest,
-    footprint_depth,
-    place_of_footprint,
-)
 from hexapod_cosim.models.contact.forces import (
     Candidate,
     Contacts,
@@ -28,32 +22,31 @@ from hexapod_cosim.models.contact.forces import (
     open_contacts,
     own_ground,
     shares_of_feet,
-    soil_for,
     sphere_centre,
     standing_pairs,
 )
 from hexapod_cosim.models.contact.geometry import FootContact
 from hexapod_cosim.models.contact.law import contact_damping
 from hexapod_cosim.models.contact.pairs import pair_contacts
-from hexapod_cosim.models.contact.spheres import side_on_ground
-from hexapod_cosim.models.ground.blocks import Cell, cell_at, depth_around, is_uneven, outside
+from hexapod_cosim.models.ground.blocks import Cell, cell_at, outside
 from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.surface import LAW, MU, MU_STATIC, STIFFNESS
 from hexapod_cosim.models.kinematics import LEGS, foot_centres
 from hexapod_cosim.models.records import Robot, Soil
 from hexapod_cosim.models.soil.law import plastic_depth, row_soil, soil_radius
 
+LEAST_FOOTPRINT = 1e-6  # m  shallower ones are not recorded
 SAME_FACE = 1e-6  # m, 1  depth and normal of one contact at both sides of a border between cells
-FAR = 1e3  # m  within its cell is a foot that has none or keeps it
+FAR = 1e3  # m  within its cell is a foot that has none
 
 
 @dataclass(frozen=True)
 class Depths:
     """Depths and approach speeds of all contacts, and how far feet have left their cells."""
 
-    delta: Array  # (n,) m  above the depth at which spheres touch soil; legs' pairs last
+    delta: Array  # (n,) m  of feet above the depth at which they touch soil; legs' pairs last
     ddelta: Array  # (n,) m/s
-    outside: Array  # (6,) m  < 0: inside; -FAR: no cell is assigned, or it is kept
+    outside: Array  # (6,) m  < 0: inside; -FAR: no cell is assigned
 
 
 def has_cells(robot: Robot) -> bool:
@@ -66,40 +59,15 @@ def depths_of(robot: Robot, body: Array, contacts: Contacts) -> Depths:
     """Returns the depths of all contacts at bodies (19, 13)."""
     found = [*contacts_at(robot, body, contacts), *pair_contacts(robot, body)]
     delta = np.array([contact.penetration for contact in found])
-    delta[: len(contacts.soil_depth)] -= contacts.soil_depth
+    delta[:LEGS] -= contacts.plastic
     far = np.full(LEGS, -FAR)
     surface = surface_of(robot.terrain)
     if surface is not None and has_cells(robot):
         for leg, at in enumerate(foot_centres(robot, body)):
             cell = contacts.cell[leg]
-            way = -FAR if cell is None else outside(surface, float(at[0]), float(at[1]), cell)
-            far[leg] = -FAR if way > 0.0 and keeps_cell(robot, contacts, leg, at) else way
+            if cell is not None:
+                far[leg] = outside(surface, float(at[0]), float(at[1]), cell)
     return Depths(delta, np.array([contact.approach_speed for contact in found]), far)
-
-
-def keeps_cell(robot: Robot, contacts: Contacts, leg: int, at: Array) -> bool:
-    """Returns whether a foot that was dragged off its block in soil keeps it. at: centre of the
-    foot (3,) [m].
-
-    It may have passed through other blocks, and no face may begin at a depth: it does not change to
-    a block in whose faces it is deeper than in those around its own. In soil or above the bottom of
-    its footprint it changes to a level block beside its own alone.
-    """
-    state, own = contacts.states[leg], contacts.cell[leg]
-    surface = surface_of(robot.terrain)
-    if own is None or surface is None or not has_soil(robot):
-        return False
-    in_footprint = contacts.soil_depth[leg] > 0.0 or (state.is_soft and not state.is_open)
-    below = cell_at(surface, float(at[0]), float(at[1]))
-    is_near = max(abs(below[0] - own[0]), abs(below[1] - own[1])) <= 1
-    if in_footprint and not (is_near and surface.height[below] == surface.height[own]):
-        return True
-    above, radius = at - np.array([0.0, 0.0, robot.terrain.height]), robot.foot.radius
-    new, old = (
-        depth_around(surface, above, radius, cell, with_top=not in_footprint)
-        for cell in (below, own)
-    )
-    return new > old + SAME_FACE
 
 
 def has_contact(robot: Robot, contacts: Contacts, leg: int) -> bool:
@@ -110,38 +78,18 @@ def has_contact(robot: Robot, contacts: Contacts, leg: int) -> bool:
     )
 
 
-def is_inside_blocks(robot: Robot, contacts: Contacts, leg: int, at: Array) -> bool:
-    """Returns whether a foot that holds a block of soil is in the faces around another one.
-    Released there, it would meet them at a depth. at: centre of the foot (3,) [m].
-    """
-    own, surface = contacts.cell[leg], surface_of(robot.terrain)
-    if own is None or surface is None or not has_soil(robot):
-        return False
-    below = cell_at(surface, float(at[0]), float(at[1]))
-    above = at - np.array([0.0, 0.0, robot.terrain.height])
-    radius = robot.foot.radius
-    return below != own and depth_around(surface, above, radius, below, with_top=True) > 0.0
-
-
 # touch-down and lift-off
 
 
-def ground_under(robot: Robot, point: Candidate, centre: Array, side: int = 2) -> ContactState:
+def ground_under(robot: Robot, point: Candidate, centre: Array) -> ContactState:
     """Returns an open contact with the ground at a sphere's centre (3,), or with its patch.
 
-    side: axis of the torso whose side faces the ground.
-
-    A patch with a kinetic coefficient of its own has no static rise unless it gives one. Walls are
-    rigid, of the patch's friction, and for torso, knees and shanks blocks with edges.
+    A patch with a kinetic coefficient of its own has no static rise unless it gives one.
     """
-    surface = surface_of(robot.terrain)
-    x, y = float(centre[0]), float(centre[1])
-    sinks = point.leg >= 0 or surface is None or not is_uneven(surface, x, y)
-    own = soil_for(robot.soil, robot, point, side) if sinks else Soil()
-    state = replace(own_ground(robot, point), soil=own, side=side)
+    surface, state = surface_of(robot.terrain), own_ground(robot, point)
     if surface is None or surface.materials is None:
         return state
-    number = surface.material_at(x, y)
+    number = surface.material_at(float(centre[0]), float(centre[1]))
     if number == 0:
         return state
     row = surface.materials[number - 1]
@@ -154,15 +102,14 @@ def ground_under(robot: Robot, point: Candidate, centre: Array, side: int = 2) -
         state,
         friction=replace(state.friction, mu=mu, mu_static=mu_static),
         contact=replace(robot.contact, stiffness=stiffness),
-        soil=soil_for(row_soil(row[LAW:]), robot, point, side) if sinks else Soil(),
+        soil=row_soil(row[LAW:]) if point.is_sole else Soil(),
     )
 
 
 def closed(robot: Robot, point: Candidate, body: Array, impact_speed: float) -> ContactState:
     """Returns the contact of a sphere that touches down at a speed [m/s], at bodies (19, 13)."""
-    sphere, damping = point.sphere, contact_damping(robot.contact, impact_speed)
-    side = side_on_ground(robot, sphere, body[sphere.body]) if sphere.pads else 2
-    state = ground_under(robot, point, sphere_centre(point, body), side)
+    damping = contact_damping(robot.contact, impact_speed)
+    state = ground_under(robot, point, sphere_centre(point, body))
     return replace(state, damping=damping, impact_speed=impact_speed)
 
 
@@ -172,35 +119,26 @@ def start_contacts(robot: Robot, body: Array) -> Contacts:
     """
     contacts = open_contacts(robot)
     depths = depths_of(robot, body, contacts)
-    states, soil_depth = list(contacts.states), contacts.soil_depth.copy()
+    states, plastic = list(contacts.states), contacts.plastic.copy()
     for k, point in enumerate(candidates(robot)):
         if depths.delta[k] > 0.0:
             states[k] = closed(robot, point, body, 0.0)
             if states[k].is_soft:
-                depth = float(depths.delta[k])
-                soil_depth[k] = plastic_depth(
-                    states[k].soil, point.shape(robot, states[k].side), depth
-                )
+                plastic[k] = plastic_depth(states[k].soil, robot.foot, float(depths.delta[k]))
     pairs = standing_pairs(robot, body)
-    contacts = replace(contacts, states=tuple(states), soil_depth=soil_depth, pairs=pairs)
+    contacts = replace(contacts, states=tuple(states), plastic=plastic, pairs=pairs)
     return assign_cells(robot, body, contacts)
 
 
 def assign_cells(robot: Robot, body: Array, contacts: Contacts) -> Contacts:
-    """Holds the cells of feet that touch blocks, are in their footprints or in other blocks, and
-    releases those of others.
-    """
+    """Holds the cells of feet that touch blocks, and releases those of others."""
     surface = surface_of(robot.terrain)
     if surface is None or not has_cells(robot):
         return contacts
     cells: list[Cell | None] = []
     for leg, at in enumerate(foot_centres(robot, body)):
-        holds = (
-            contacts.soil_depth[leg] > 0.0
-            or has_contact(robot, contacts, leg)
-            or is_inside_blocks(robot, contacts, leg, at)
-        )
         below = cell_at(surface, float(at[0]), float(at[1]))
+        holds = has_contact(robot, contacts, leg)
         cells.append((contacts.cell[leg] or below) if holds else None)
     return replace(contacts, cell=tuple(cells))
 
@@ -215,7 +153,6 @@ def switch_contacts(
     delta = depths.delta
     if has_soil(robot):
         contacts, delta = update_footprints(robot, body, contacts, delta)
-        contacts = assign_cells(robot, body, contacts)
     states, touchdowns = list(contacts.states), 0
     walls = has_cells(robot)
     found = contacts_at(robot, body, contacts) if walls else []
@@ -272,62 +209,71 @@ def _continued(
 # soil
 
 
+def deepest(start: float, slope_start: float, end: float, slope_end: float) -> float:
+    """Returns the largest value on [0, 1] of the cubic with these ends and slopes (eq. 28)."""
+    if not (slope_start > 0.0 and slope_end < 0.0):
+        return max(start, end)
+    bend = slope_start + slope_end - 2.0 * (end - start)
+    curve = end - start - slope_start - bend
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        x = 0.5 * (low + high)
+        rises = slope_start + x * (2.0 * curve + 3.0 * x * bend) > 0.0
+        low, high = (x, high) if rises else (low, x)
+    top = start + low * (slope_start + low * (curve + low * bend))
+    return max(top, start, end)
+
+
+def footprint_depth(footprints: Array, centre: Array) -> float:
+    """Returns the depth [m] of the deepest footprint around a point; 0 outside of all."""
+    away = np.hypot(footprints[:, 0] - centre[0], footprints[:, 1] - centre[1])
+    inside = footprints[away <= footprints[:, 3]]
+    return float(np.max(inside[:, 2], initial=0.0))
+
+
 def yield_soil(robot: Robot, contacts: Contacts, h: float, before: Depths, after: Depths) -> Array:
-    """Returns the plastic depths (n,) of all spheres [m] at the end of a step of h [s] (eq. 44).
+    """Returns the plastic depths (6,) of feet [m] at the end of a step of h [s] (eq. 44).
 
     They follow from the largest depths between the steps' ends. before, after: at the ends, with
     the plastic depths of the step.
     """
-    soil_depth = contacts.soil_depth.copy()
-    for k, (point, state) in enumerate(zip(candidates(robot), contacts.states, strict=True)):
+    plastic = contacts.plastic.copy()
+    for leg, state in enumerate(contacts.states[:LEGS]):
         if state.is_open or not state.is_soft:
             continue
-        from_, to = (float(ends.delta[k] + soil_depth[k]) for ends in (before, after))
-        slopes = (h * float(before.ddelta[k]), h * float(after.ddelta[k]))
+        from_, to = (float(ends.delta[leg] + plastic[leg]) for ends in (before, after))
+        slopes = (h * float(before.ddelta[leg]), h * float(after.ddelta[leg]))
         depth = deepest(from_, slopes[0], to, slopes[1])
-        shape = point.shape(robot, state.side)
-        soil_depth[k] = max(soil_depth[k], plastic_depth(state.soil, shape, depth))
-    return soil_depth
+        plastic[leg] = max(plastic[leg], plastic_depth(state.soil, robot.foot, depth))
+    return plastic
 
 
 def update_footprints(
     robot: Robot, body: Array, contacts: Contacts, delta: Array
 ) -> tuple[Contacts, Array]:
-    """Records the footprints that spheres leave upwards, and finds those entered from above.
+    """Records the footprints that feet leave upwards, and finds those entered from above.
 
-    An open sphere below the undisturbed surface is above its footprint, whose bottom it may touch
-    again; the footprint is complete when the sphere has left it upwards. Rigid ground beside a
+    An open foot below the undisturbed surface is above its footprint, whose bottom it may touch
+    again; the footprint is complete when the foot has left it upwards. Rigid ground beside a
     footprint has none. Depths (n,) follow the plastic depths to which they refer.
     """
-    delta, soil_depth, place = delta.copy(), contacts.soil_depth.copy(), contacts.place.copy()
+    delta, plastic, place = delta.copy(), contacts.plastic.copy(), contacts.place.copy()
     footprints = contacts.footprints
-    for k, point in _in_plant_order(robot):
-        z, state, centre = (
-            delta[k] + soil_depth[k],
-            contacts.states[k],
-            sphere_centre(point, body),
-        )
-        if not state.is_open:
-            if delta[k] <= 0.0:
-                place[k] = place_of_footprint(robot, contacts, point, centre)
+    for leg, point in enumerate(candidates(robot)[:LEGS]):
+        z, centre = delta[leg] + plastic[leg], sphere_centre(point, body)
+        if not contacts.states[leg].is_open:
+            if delta[leg] <= 0.0:
+                place[leg] = centre[:2]
             continue
         if z <= 0.0:
-            if soil_depth[k] >= LEAST_FOOTPRINT:
-                new = [*place[k], soil_depth[k], soil_radius(point.shape(robot, state.side))]
+            if plastic[leg] >= LEAST_FOOTPRINT:
+                new = [*place[leg], plastic[leg], soil_radius(robot.foot)]
                 footprints = np.vstack([footprints, new])
-            soil_depth[k] = 0.0
-        elif soil_depth[k] == 0.0 and ground_under(robot, point, centre).is_soft:
-            soil_depth[k] = footprint_depth(footprints, centre, surface_of(robot.terrain))
-        delta[k] = z - soil_depth[k]
-    return replace(contacts, soil_depth=soil_depth, place=place, footprints=footprints), delta
-
-
-def _in_plant_order(robot: Robot) -> list[tuple[int, Candidate]]:
-    """Returns the spheres that may sink with their numbers, in the order in which the C plant
-    looks at them: feet, knees, shanks, corners of the torso.
-    """
-    spheres = [(k, point) for k, point in enumerate(candidates(robot)) if point.may_sink]
-    return sorted(spheres, key=lambda numbered: numbered[1].sphere.name == "torso")
+            plastic[leg] = 0.0
+        elif plastic[leg] == 0.0 and ground_under(robot, point, centre).is_soft:
+            plastic[leg] = footprint_depth(footprints, centre)
+        delta[leg] = z - plastic[leg]
+    return replace(contacts, plastic=plastic, place=place, footprints=footprints), delta
 
 
 # blocks
@@ -373,9 +319,9 @@ def is_same_face(a: FootContact, b: FootContact) -> bool:
 def continued_state(
     old: ContactState, from_: Candidate, to: Candidate, before: ContactState
 ) -> ContactState:
-    """Returns a contact that continues in another face. Bristles and soil are those of soles."""
+    """Returns a contact that continues in another face. Bristles are those of soles."""
     if from_.is_sole and to.is_sole:
         return old
     law = before.friction.law
     static = replace(old.friction, law=law)
-    return replace(old, friction=static, soil=Soil())
+    return replace(old, friction=static)

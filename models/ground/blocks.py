@@ -56,15 +56,6 @@ def cell_at(surface: Surface, x: float, y: float) -> Cell:
     )
 
 
-def is_uneven(surface: Surface, x: float, y: float) -> bool:
-    """Returns whether the block below a place [m] is higher or lower than a neighbour."""
-    if surface.kind != "blocks":
-        return False
-    row, column = cell_at(surface, x, y)
-    around = surface.height[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
-    return float(np.ptp(around)) > 0.0
-
-
 def outside(surface: Surface, x: float, y: float, cell: Cell) -> float:
     """Returns how far (x, y) is outside of a cell [m], negative inside; border cells have no outer
     end.
@@ -108,17 +99,6 @@ def block_face(surface: Surface, point: Array, kind: str, cell: Cell) -> tuple[f
         if _column(surface, cell[0] + way[0], cell[1] + way[1]) > own
     ]
     return min(faces, key=lambda face: face[0]) if faces else None
-
-
-def depth_around(
-    surface: Surface, centre: Array, radius: float, cell: Cell, *, with_top: bool = False
-) -> float:
-    """Returns the depth [m] of a sphere at (3,) in the walls, edges and corners around a cell, and
-    with_top in its top, 0 where it touches none.
-    """
-    kinds = FACES if with_top else FACES[1:]
-    faces = [block_face(surface, centre, kind, cell) for kind in kinds]
-    return max(0.0, *(radius - (math.inf if face is None else face[0]) for face in faces))
 
 
 def _column(surface: Surface, row: int, column: int) -> float:

@@ -6,9 +6,7 @@ A Ke (z - z_p) with the plastic depth z_p, the largest z - F_v(z)/(A Ke) so far.
 bristle b whose force is the Janosi-Hanamoto curve. plant_fmu/src/ground/soil.c is the fast form,
 with the same names.
 
-A foot is a sphere of radius R = foot.radius, or on soil a flat round pad of foot.pad_radius. Torso,
-knees and shanks are given as such feet with radii of their own; their shear has no bristle, it is
-the whole T_max against the slip.
+A foot is a sphere of radius R = foot.radius, or on soil a flat round pad of foot.pad_radius.
 """
 
 from __future__ import annotations
@@ -19,7 +17,6 @@ from collections.abc import Callable
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
-from hexapod_cosim.models.friction import Friction, regularised_direction
 from hexapod_cosim.models.records import Foot, Soil
 
 REACHED = 1e-8  # m  short of the virgin curve: links are off their joints by less
@@ -224,14 +221,6 @@ def shear_rate(soil: Soil, slip: Array, bristle: Array) -> Array:
 def shear_force(soil: Soil, limit: float, bristle: Array) -> Array:
     """Returns the shear force -T_max b/K (3,) [N] (eq. 47)."""
     return -limit / soil.shear_displacement * bristle
-
-
-def body_shear_drag(friction: Friction, limit: float, slip_speed: float) -> float:
-    """Returns T_max tanh(k_t v)/v [N s/m] of torso, knees and shanks, which have no bristles.
-
-    limit: T_max [N]; slip_speed: v [m/s].
-    """
-    return limit * regularised_direction(friction, slip_speed)
 
 
 def table_row(soil: Soil) -> tuple[float, ...]:

@@ -9,7 +9,7 @@ import math
 
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.friction import LAWS, Friction
-from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.surface import LAW, Surface
 from hexapod_cosim.models.ground.valleys import tightest_valley
 from hexapod_cosim.models.records import BodyContact, Robot, Servo
 
@@ -36,12 +36,18 @@ def check_terrain(robot: Robot, where: str) -> None:
 
 def check_contact_surface(robot: Robot, surface: Surface, where: str) -> None:
     """Checks that blocks and valleys of a surface are wide enough for the spheres that touch it,
-    and that blocks of the robot's own soil are level.
+    and that blocks are rigid.
 
     A sphere touches one block of a row beside it at most. In a valley narrower than a sphere it
     touches at two places, of which the plant computes one: forces jump, and energy is not
     conserved. Raises RobotError; `where` names the surface.
     """
+    tables = () if surface.materials is None else surface.materials
+    if surface.kind == "blocks" and (robot.soil.law != "none" or any(row[LAW] for row in tables)):
+        what = "soil on blocks"
+        expected = "rigid ground, because soil needs a smooth surface"
+        fix = "take soil away, or choose plane, sand or another smooth terrain"
+        raise RobotError(what, got=surface.name, expected=expected, fix=fix, where=where)
     name, radius = _largest_sphere(robot)
     part = "foot" if name == "foot.radius" else "part"
     if surface.kind == "blocks" and surface.cell < 2.0 * radius:

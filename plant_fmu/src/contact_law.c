@@ -80,21 +80,18 @@ static void set_ground(const hxModel *model, const double *material, int row, in
   contact->static_rise[row][slot] = material ? fmax(mu_static - mu, 0.0) : model->static_rise;
 }
 
-/* Sets the soil of a contact to that of a material, NULL: of the definition. */
-static void set_soil(const hxModel *model, const double *material, int row, int slot, int shape,
+/* Sets the soil of a foot's contact to that of a material, NULL: of the definition. */
+static void set_soil(const hxModel *model, const double *material, int slot,
                      hxContactState *contact) {
-  const int soft = hx_soil_row(row);
-  const hxSoilShape is = {model->radius[row], model->pad_radius[shape], model->breadth[shape]};
   hxSoil soil;
   double numbers[HX_SOIL_SIZE];
   if (material)
-    hx_soil_from_row(material + HX_MATERIAL_SOIL, &is, &soil);
+    hx_soil_from_row(material + HX_MATERIAL_SOIL, model->radius[HX_FOOT], model->pad_radius, &soil);
   else
-    memcpy(&soil, model->soil[shape], sizeof soil);
-  /* a point without size meets rigid ground: soil has no pressure on it */
-  contact->on_soil[soft][slot] = (int)soil.law != HX_SOIL_NONE && soil.radius > 0.0 ? 1.0 : 0.0;
+    memcpy(&soil, model->soil, sizeof soil);
+  contact->on_soil[slot] = (int)soil.law != HX_SOIL_NONE ? 1.0 : 0.0;
   memcpy(numbers, &soil, sizeof soil);
-  for (int i = 0; i < HX_SOIL_SIZE; ++i) contact->soil[soft][i][slot] = numbers[i];
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) contact->soil[i][slot] = numbers[i];
 }
 
 /* Copies the centre of a row's sphere. */
@@ -112,29 +109,12 @@ static const double *material_under(const hxModel *model, const hxDepths *depths
   return hx_terrain_material(model->terrain, centre);
 }
 
-int hx_may_sink_at(const hxModel *model, int row, const double centre[3]) {
-  return hx_may_sink(row) &&
-         (row == HX_FOOT || !model->terrain || !hx_terrain_is_uneven(model->terrain, centre));
-}
-
-/* Sets whether a contact is on soil, and on which. */
-static void choose_soil(const hxModel *model, const hxDepths *depths, const double *material,
-                        int row, int slot, hxContactState *contact) {
-  double centre[3] = {0.0};
-  if (model->terrain) centre_of(depths, row, slot, centre);
-  if (hx_may_sink_at(model, row, centre))
-    set_soil(model, material, row, slot,
-             hx_soil_shape(row, row == HX_TORSO ? depths->side[slot] : 0), contact);
-  else
-    contact->on_soil[hx_soil_row(row)][slot] = 0.0;
-}
-
 /* Closes a contact: fixes its damping by the impact speed, m/s, and its ground by its place. */
 static void close_contact(const hxModel *model, const hxDepths *depths, int row, int slot,
                           double impact_speed, hxContactState *contact) {
   const double *material = material_under(model, depths, row, slot);
   set_ground(model, material, row, slot, contact);
-  if (model->has_soil && hx_may_sink(row)) choose_soil(model, depths, material, row, slot, contact);
+  if (model->has_soil && row == HX_FOOT) set_soil(model, material, slot, contact);
   contact->closed[row][slot] = 1.0;
   contact->impact_speed[row][slot] = impact_speed;
   contact->damping[row][slot] = hx_contact(model->contact_law)->damping(model, impact_speed);
@@ -154,42 +134,18 @@ static void fill_contact_slots(hxContactState *contact, int row) {
   hx_fill_slots(contact->stiffness[row]);
   hx_fill_slots(contact->mu[row]);
   hx_fill_slots(contact->static_rise[row]);
-  if (!hx_may_sink(row)) return;
-  hx_fill_slots(contact->on_soil[hx_soil_row(row)]);
-  for (int i = 0; i < HX_SOIL_SIZE; ++i) hx_fill_slots(contact->soil[hx_soil_row(row)][i]);
+  if (row != HX_FOOT) return;
+  hx_fill_slots(contact->on_soil);
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) hx_fill_slots(contact->soil[i]);
 }
 
-double hx_depth_around(const hxModel *model, const double cell[2], const double centre[3],
-                       int with_top) {
-  const double point[3] = {centre[0], centre[1], centre[2] - model->ground_point[2]};
-  double depth = 0.0;
-  for (int kind = with_top ? HX_FACE_TOP : HX_FACE_WALL; kind <= HX_FACE_CORNER; ++kind) {
-    hxFace face;
-    hx_terrain_face(model->terrain, (hxFaceKind)kind, cell, point, 0, &face);
-    depth = fmax(depth, model->radius[HX_FOOT] - face.distance);
-  }
-  return depth;
-}
-
-int hx_is_inside_blocks(const hxModel *model, const hxContactState *contact, int leg,
-                        const double centre[3]) {
-  double below[2];
-  if (!model->has_soil || contact->cell[0][leg] < 0.0) return 0;
-  hx_terrain_cell_at(model->terrain, centre, below);
-  if (below[0] == contact->cell[0][leg] && below[1] == contact->cell[1][leg]) return 0;
-  return hx_depth_around(model, below, centre, 1) > 0.0;
-}
-
-/* Holds the cells of feet that touch the ground, are in their prints or in other blocks, and
- * releases those of others. */
+/* Holds the cells of feet that touch the ground and releases those of others. */
 static void hold_cells(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int touches = 0;
     for (int row = HX_FOOT; hx_is_of_foot(row); ++row) touches |= contact->closed[row][leg] != 0.0;
-    touches |= contact->plastic[hx_soil_row(HX_FOOT)][leg] > 0.0;
     double centre[3];
     centre_of(depths, HX_FOOT, leg, centre);
-    touches = touches || hx_is_inside_blocks(model, contact, leg, centre);
     double cell[2] = {contact->cell[0][leg], contact->cell[1][leg]};
     if (touches && cell[0] < 0.0) hx_terrain_cell_at(model->terrain, centre, cell);
     for (int i = 0; i < 2; ++i) contact->cell[i][leg] = touches ? cell[i] : -1.0;
@@ -207,25 +163,17 @@ void hx_contact_release(hxContactState *contact) {
     contact->cell[0][slot] = contact->cell[1][slot] = -1.0;
 }
 
-/* Returns the soil on which a contact touched down. */
-static hxSoil soil_of(const hxContactState *contact, int row, int slot) {
-  hxSoil soil;
-  double numbers[HX_SOIL_SIZE];
-  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = contact->soil[hx_soil_row(row)][i][slot];
-  memcpy(&soil, numbers, sizeof soil);
-  return soil;
-}
-
-/* Sets the plastic depths of contacts of a row that begin in soil, as if they had been pressed into
- * it. */
-static void start_in_soil(const hxDepths *depths, int row, hxContactState *contact) {
-  const int soft = hx_soil_row(row);
-  for (int slot = 0; slot < hx_slots_of(row); ++slot) {
-    const hxSoil soil = soil_of(contact, row, slot);
-    if (contact->closed[row][slot] != 0.0 && contact->on_soil[soft][slot] != 0.0)
-      contact->plastic[soft][slot] = hx_soil_plastic_depth(&soil, depths->delta[row][slot]);
+/* Sets the plastic depths of feet that begin in soil, as if they had been pressed into it. */
+static void start_in_soil(const hxDepths *depths, hxContactState *contact) {
+  for (int slot = 0; slot < HX_LEGS; ++slot) {
+    hxSoil soil;
+    double numbers[HX_SOIL_SIZE];
+    for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = contact->soil[i][slot];
+    memcpy(&soil, numbers, sizeof soil);
+    if (contact->closed[HX_FOOT][slot] != 0.0 && contact->on_soil[slot] != 0.0)
+      contact->plastic[slot] = hx_soil_plastic_depth(&soil, depths->delta[HX_FOOT][slot]);
   }
-  if (row != HX_TORSO) hx_fill_slots(contact->plastic[soft]);
+  hx_fill_slots(contact->plastic);
 }
 
 void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
@@ -237,7 +185,7 @@ void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactSta
     for (int slot = 0; slot < hx_slots_of(row); ++slot)
       if (depths->delta[row][slot] > 0.0) close_contact(model, depths, row, slot, 0.0, contact);
     fill_contact_slots(contact, row);
-    if (model->has_soil && hx_may_sink(row)) start_in_soil(depths, row, contact);
+    if (model->has_soil && row == HX_FOOT) start_in_soil(depths, contact);
   }
   if (hx_has_cells(model)) hold_cells(model, depths, contact);
 }
@@ -251,8 +199,7 @@ void hx_contact_tune(const hxModel *model, const hxDepths *depths, hxContactStat
       if (contact->closed[row][slot] == 0.0) continue;
       set_ground(model, material, row, slot, contact);
       contact->damping[row][slot] = hx_contact(model->contact_law)->damping(model, impact_speed);
-      if (hx_may_sink(row) && contact->on_soil[hx_soil_row(row)][slot] != 0.0 && row != HX_TORSO)
-        set_soil(model, material, row, slot, hx_soil_shape(row, 0), contact);
+      if (row == HX_FOOT && contact->on_soil[slot] != 0.0) set_soil(model, material, slot, contact);
     }
     fill_contact_slots(contact, row);
   }
@@ -347,8 +294,6 @@ static void copy_contact(const hxContactState *from, int row_from, int row_to, i
   to->stiffness[row_to][leg] = from->stiffness[row_from][leg];
   to->mu[row_to][leg] = from->mu[row_from][leg];
   to->static_rise[row_to][leg] = from->static_rise[row_from][leg];
-  if (row_to == HX_FOOT && row_from != HX_FOOT) /* walls are rigid */
-    to->on_soil[0][leg] = to->plastic[0][leg] = 0.0;
 }
 
 int hx_contact_cross(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
@@ -381,5 +326,4 @@ void hx_contact_hand_over(const hxMoment *before, const hxMoment *after, int cro
         }
     }
   for (int row = HX_FOOT; hx_is_of_foot(row); ++row) fill_contact_slots(contact, row);
-  hx_fill_slots(contact->plastic[0]);
 }

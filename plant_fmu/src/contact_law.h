@@ -30,20 +30,6 @@ void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactSta
 /* Returns whether feet stand on cells of blocks. */
 int hx_has_cells(const hxModel *model);
 
-/* Returns whether a row's contact sinks where the ground at its centre is soil: on blocks with
- * edges feet alone do. */
-int hx_may_sink_at(const hxModel *model, int row, const double centre[3]);
-
-/* Returns the depth of a foot in the walls, edges and corners around a cell, and with_top in its
- * top, 0: none touched. */
-double hx_depth_around(const hxModel *model, const double cell[2], const double centre[3],
-                       int with_top);
-
-/* Returns whether a foot that holds a block of soil is in the faces around another one. Released
- * there, it would meet them at a depth. */
-int hx_is_inside_blocks(const hxModel *model, const hxContactState *contact, int leg,
-                        const double centre[3]);
-
 /* Moves the held cells of feet that have left them to those that they are over; returns a bit for
  * each leg that did. */
 int hx_contact_cross(const hxModel *model, const hxDepths *depths, hxContactState *contact);

@@ -56,13 +56,8 @@ static inline hxFrictionKind hx_friction_kind(int law) {
   return laws[law];
 }
 
-/* Numbers of hxSoil (ground/soil.h), and rows of contacts that may be on soil: those of feet with
- * the ground below them, of knees, of shanks and of the torso (hx_soil_row). */
-enum { HX_SOIL_SIZE = 16, HX_SOIL_ROWS = 4 };
-
-/* Shapes in soil: one of each row, of the torso's corners one for each axis to which the side of
- * the box that lies on the soil is normal. */
-enum { HX_SOIL_SHAPES = HX_SOIL_ROWS + 2 };
+/* Numbers of hxSoil (ground/soil.h). */
+enum { HX_SOIL_SIZE = 16 };
 
 /* Offsets of position, quaternion, velocity and angular velocity in a body state. */
 enum { HX_R = 0, HX_P = 3, HX_V = 7, HX_W = 10 };
@@ -156,10 +151,9 @@ typedef struct hxModel {
   double goal_speed;               /* rad/s  of the firmware's setpoints; 0: no limit */
   double overload_time, overload_torque, overload_left; /* s, N m, 1  eq. 58 */
   double ground_point[3], ground_normal[3];
-  double soil[HX_SOIL_SHAPES][HX_SOIL_SIZE]; /* hxSoil of each shape, of the definition */
-  double bristle_length;                     /* m  presliding, or shear displacement of the soil */
-  double pad_radius[HX_SOIL_SHAPES];         /* m  of discs of the pads' areas; 0: spheres */
-  double breadth[HX_SOIL_SHAPES];            /* m  b of eq. 40; 0: the radius */
+  double soil[HX_SOIL_SIZE]; /* hxSoil under the feet, of the definition */
+  double bristle_length;     /* m  presliding, or shear displacement of the soil */
+  double pad_radius;         /* m  of the feet's pads; 0: spheres */
   double step, tolerance, step_max;
   double load_threshold; /* N  a foot with a larger load counts its slip */
 } hxModel;
@@ -204,12 +198,12 @@ typedef struct hxContactState {
   double stiffness[HX_ROWS][HX_SLOTS];    /* N/m^1.5  K of the ground where it touched down */
   double mu[HX_ROWS][HX_SLOTS];           /* 1        friction of that ground */
   double static_rise[HX_ROWS][HX_SLOTS];  /* 1        mu_s - mu of eq. 18 */
-  double on_soil[HX_SOIL_ROWS][HX_SLOTS]; /* 1    1: the sphere touched down on soil */
-  double soil[HX_SOIL_ROWS][HX_SOIL_SIZE][HX_SLOTS]; /* numbers of an hxSoil, where on_soil is 1 */
-  /* m  depth at which spheres touch soil: z_p, or that of the footprint above which one is; 0 on
+  double on_soil[HX_SLOTS];               /* 1    1: the foot touched down on soil */
+  double soil[HX_SOIL_SIZE][HX_SLOTS];    /* numbers of an hxSoil, where on_soil is 1 */
+  /* m  depth at which feet touch soil: z_p, or that of the footprint above which one is; 0 on
    *    rigid ground */
-  double plastic[HX_SOIL_ROWS][HX_SLOTS];
-  double place[HX_SOIL_ROWS][2][HX_SLOTS]; /* m  x and y where they left the bottom of that print */
+  double plastic[HX_SLOTS];
+  double place[2][HX_SLOTS];   /* m  x and y where they left the bottom of that print */
   double cell[2][HX_SLOTS];    /* 1    blocks: column and row over which a foot is; < 0: not held */
   double nearest[2][HX_SLOTS]; /* m  smooth grids: x and y from a foot's centre to the point nearest
                                 *    to it at the start of a step, where the search for that point
@@ -222,8 +216,6 @@ typedef struct hxDepths {
   /* on a grid only */
   double centre[HX_GROUND_ROWS][3][HX_SLOTS]; /* m  of spheres, world axes; of feet in HX_FOOT */
   double outside[HX_SLOTS]; /* m  how far a foot is outside of the cell that is held for it */
-  /* where contacts close on soil only */
-  int side[HX_SLOTS]; /* axis (0 to 2) of the torso whose side faces the ground at a corner */
 } hxDepths;
 
 /* A row of contacts at one end of a step. World axes; for pairs of legs the next leg is the ground.
@@ -341,27 +333,10 @@ static inline int hx_is_wall(int row) { return row >= HX_WALL && row < HX_KNEE; 
 /* Returns whether a row's contacts are those of pairs of legs. */
 static inline int hx_is_of_pair(int row) { return row >= HX_PAIR; }
 
-/* Returns whether a row's contacts may be on soil; walls are rigid. */
-static inline int hx_may_sink(int row) {
-  return row == HX_FOOT || (row >= HX_KNEE && row <= HX_TORSO);
-}
-
-/* Returns the index of such a row in arrays of HX_SOIL_ROWS. */
-static inline int hx_soil_row(int row) { return row == HX_FOOT ? 0 : 1 + row - HX_KNEE; }
-
-/* Returns the shape of a row, of the torso that on a side. */
-static inline int hx_soil_shape(int row, int side) {
-  return hx_soil_row(row) + (row == HX_TORSO ? side : 0);
-}
-
-/* Makes the penetrations of a model's rows relative to the depth at which they touch the ground. */
-static inline void hx_depths_on_soil(const hxModel *model, const hxContactState *contact,
-                                     hxDepths *depths) {
-  for (int k = 0; k < model->listed; ++k) {
-    const int row = model->row[k];
-    for (int slot = 0; hx_may_sink(row) && slot < HX_SLOTS; ++slot)
-      depths->delta[row][slot] -= contact->plastic[hx_soil_row(row)][slot];
-  }
+/* Makes the penetrations of feet relative to the depth at which they touch the ground. */
+static inline void hx_depths_on_soil(const hxContactState *contact, hxDepths *depths) {
+  for (int slot = 0; slot < HX_SLOTS; ++slot)
+    depths->delta[HX_FOOT][slot] -= contact->plastic[slot];
 }
 
 /* Returns how many slots of a row of contacts hold one. */

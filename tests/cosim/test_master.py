@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import zipfile
 from pathlib import Path
 from typing import Literal
@@ -44,18 +43,7 @@ def scenario_of(*settings: str) -> Scenario:
     return load_scenario("walk_flat", overrides=settings)
 
 
-class Hanging(FakeController):
-    """A controller whose fourth call does not return."""
-
-    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
-        while len(self.times) == 3:
-            pass
-        return super().step(t, command, measurement)
-
-
-def run_fake(
-    plant: FakePlant, controller: JointController, scenario: Scenario, *, time_limit: float = 60.0
-) -> Outcome:
+def run_fake(plant: FakePlant, controller: JointController, scenario: Scenario) -> Outcome:
     schedule = make_schedule(scenario)
     signals = Signals(plant, errors=errors_of(scenario, schedule))
     return run(
@@ -65,19 +53,7 @@ def run_fake(
         schedule,
         Recorder(signals, schedule.times, schedule.rows),
         h=scenario.macro_step,
-        time_limit=time_limit,
     )
-
-
-@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="this system has no such timer")
-def test_a_controller_that_does_not_answer_ends_the_run_and_the_rows_until_then_are_kept() -> None:
-    before = signal.getsignal(signal.SIGALRM)
-    outcome = run_fake(FakePlant(), Hanging(), scenario_of("duration=0.05"), time_limit=0.05)
-    assert outcome.status == FAILED
-    assert outcome.reason == "TimeoutError: the controller has not answered for 0.05 s"
-    assert len(outcome.recording.time) == 3
-    assert signal.getsignal(signal.SIGALRM) == before
-    assert signal.getitimer(signal.ITIMER_REAL)[0] == 0.0
 
 
 def test_each_macro_step_reads_controls_sets_and_steps_in_this_order() -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from grids import Ground, start_on_grid
-from plant import Plant
+from plant import Plant, PlantError
 from states import changed
 from test_grid_motion import march, marching
 
@@ -173,8 +173,7 @@ def test_every_kernel_walks_by_the_same_bits(core: ct.CDLL, kind: str, method: s
     assert_same(saved_by_kernels(core, robot_on(kind, solver={"method": method}), kind))
 
 
-@pytest.mark.parametrize("kind", BLOCKS)
-def test_every_kernel_walks_on_soft_blocks_by_the_same_bits(core: ct.CDLL, kind: str) -> None:
-    robot = changed(robot_on(kind), foot={"pad_radius": 0.025})
-    soft = replace(robot, soil=soil_preset("dry_sand").soil)
-    assert_same(saved_by_kernels(core, soft, kind))
+def test_soil_on_blocks_is_refused_by_the_plant(core: ct.CDLL) -> None:
+    soft = replace(robot_on("stairs"), soil=soil_preset("dry_sand").soil)
+    with pytest.raises(PlantError, match="soil on blocks"):
+        put(core, soft, ground_of(core, "stairs"))

@@ -95,7 +95,6 @@ def live(browser: Any, address: str) -> Iterator[LivePage]:
 def test_the_page_opens_without_errors_and_asks_for_nothing_else(
     live: LivePage, address: str
 ) -> None:
-    live.until("document.querySelectorAll('#plots .uplot').length === 4")
     assert live.errors == []
     assert live.requests == [address]
     assert live.page.inner_text("#state") == "live"
@@ -146,6 +145,22 @@ def test_dragging_the_robot_pushes_it_and_letting_go_ends_the_push(live: LivePag
     live.page.mouse.up()
     assert live.value("view.eye.controls.object.position.toArray()") != before
     live.page.click("#home")
+
+
+LEG_PLACE = """() => {
+  const { view } = window.hexapod, { width, height } = view.canvas.getBoundingClientRect();
+  for (let y = 0; y < height; y += 4)
+    for (let x = 0; x < width; x += 4)
+      if (view.legAt({ clientX: x, clientY: y }) === 2) return [x, y];
+}"""
+
+
+def test_a_click_on_a_leg_makes_it_limp_and_another_one_healthy(live: LivePage) -> None:
+    live.place()
+    for words in ("Leg LR is limp.", "Leg LR works again."):
+        live.page.mouse.click(*live.page.evaluate(LEG_PLACE))
+        live.page.wait_for_selector(f"#notes p:has-text('{words}')")
+    live.place()
 
 
 def test_gait_control_friction_and_ground_are_changed(live: LivePage) -> None:

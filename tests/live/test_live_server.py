@@ -16,8 +16,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from hexapod_cosim.cosim.scenario.reading import load_scenario
-from hexapod_cosim.extensions.live.hub import MOST_CLIENTS, Hub
-from hexapod_cosim.extensions.live.server import LiveError, LiveServer
+from hexapod_cosim.extensions.live.server import MOST_PAGES, LiveError, LiveServer, Page
 from hexapod_cosim.extensions.live.settings import Choices, control_texts
 
 PATIENCE = 180.0  # s    for a loaded machine; nothing is asserted about it
@@ -182,10 +181,10 @@ def test_a_page_that_misbehaves_is_closed_and_another_one_goes_on(
 
 
 def test_a_page_too_many_is_refused(running: Running) -> None:
-    while running.server.hub.clients:  # those of the tests before
+    while running.server.pages:  # those of the tests before
         threading.Event().wait(0.01)
     with ExitStack() as stack:
-        for _ in range(MOST_CLIENTS):
+        for _ in range(MOST_PAGES):
             until(stack.enter_context(running.socket()), is_frame)
         one_more = stack.enter_context(running.socket())
         assert closing(one_more) == (1013, "too many pages")
@@ -204,18 +203,29 @@ def test_a_port_that_is_taken_is_refused(running: Running) -> None:
 
 
 def test_a_page_that_reads_nothing_waits_for_the_newest_state_alone() -> None:
-    hub, sent = Hub(), list[str]()
-    client = hub.join()
-    assert client is not None
-    for number in range(1000):
-        hub.publish("frame", {"number": number})
+    sent = list[str]()
 
     async def send(text: str) -> None:
         sent.append(text)
 
     async def read() -> None:
+        page = Page({"world": "the world"})
+        for number in range(1000):
+            page.offer("frame", str(number))
         with suppress(TimeoutError):
-            await asyncio.wait_for(client.send_all(send), 0.05)
+            await asyncio.wait_for(page.send_all(send), 0.05)
 
     asyncio.run(read())
-    assert [json.loads(text)["number"] for text in sent] == [999]
+    assert sent == ["the world", "999"]
+
+
+def test_a_page_that_joins_later_gets_no_old_notes(running: Running) -> None:
+    with running.socket() as first:
+        first.send(json.dumps({"type": "leg", "leg": 0}))
+        until(first, lambda m: m["type"] == "note")
+        with running.socket() as later:
+            kinds = [json.loads(later.recv(PATIENCE))["type"] for _ in range(6)]
+        first.send(json.dumps({"type": "leg", "leg": 0}))
+        until(first, lambda m: m["type"] == "note")
+    assert {"world", "status", "frame"} <= set(kinds)
+    assert "note" not in kinds

@@ -246,3 +246,9 @@ def test_a_urdf_and_a_table_give_the_ground_back(tmp_path: Path) -> None:
     assert load_robot(path).hash == robot.hash
     table = terrain_table(robot.terrain)
     assert robot_from_table(table_with(table), where="test").terrain == robot.terrain
+
+
+def test_a_patch_of_soil_on_blocks_is_refused() -> None:
+    patch = {"x": 0.0, "y": 0.0, "size": 1.0, "soil": "dry_sand"}
+    with pytest.raises(RobotError, match=r"soil on blocks.*rubble.*smooth"):
+        robot_from_table(table_with({"kind": "rubble", "patch": [patch]}), where="test")

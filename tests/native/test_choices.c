@@ -14,7 +14,7 @@
 
 #include "check.h"
 
-enum { GRIDS = 4, FILES = 3, STEPS = 30, STATE = 1 << 19, FILE_SIZE = 1 << 20 };
+enum { GRIDS = 3, STEPS = 30, STATE = 1 << 19, FILE_SIZE = 1 << 20 };
 
 typedef struct {
   const char *name;
@@ -135,11 +135,7 @@ static const hxChoice choices[] = {{"nothing", nothing, 0, 0.01},
                                    {"body on a grid", body_on_grid, 1, 0.01},
                                    {"body on blocks", body_on_grid, 2, 0.01},
                                    {"soil on a grid", soil_on_grid, 1, 0.01},
-                                   {"soil on level blocks", soil_on_grid, 4, 0.01},
-                                   {"bekker on a grid", bekker_on_grid, 1, 0.01},
-                                   {"bekker on level blocks", bekker_on_grid, 4, 0.01},
-                                   {"soil on blocks", soil_on_grid, 2, 0.01},
-                                   {"bekker on blocks", bekker_on_grid, 2, 0.01}};
+                                   {"bekker on a grid", bekker_on_grid, 1, 0.01}};
 
 /* ---- walks ---- */
 
@@ -389,19 +385,11 @@ static void contradictions_are_refused_by_name(void) {
   hx_plant_destroy(plant);
 }
 
-/* Creates a copy of a grid file with all heights 0. */
-static hxTerrain *levelled(unsigned char *bytes, size_t size) {
-  enum { HEAD = 128 };
-  char message[HX_MESSAGE_SIZE] = "";
-  if (size > HEAD) memset(bytes + HEAD, 0, size - HEAD);
-  return hx_terrain_create(bytes, size, message);
-}
-
 static void read_grids(const char *folder) {
-  static const char *const name[FILES] = {"smooth", "blocks", "material"};
+  static const char *const name[GRIDS] = {"smooth", "blocks", "material"};
   static unsigned char bytes[FILE_SIZE];
   char path[4096], message[HX_MESSAGE_SIZE] = "";
-  for (int k = 0; k < FILES; ++k) {
+  for (int k = 0; k < GRIDS; ++k) {
     snprintf(path, sizeof path, "%s/%s", folder, name[k]);
     FILE *file = fopen(path, "rb");
     const size_t n = file ? fread(bytes, 1, sizeof bytes, file) : 0;
@@ -409,9 +397,7 @@ static void read_grids(const char *folder) {
     terrain[k] = hx_terrain_create(bytes, n, message);
     if (!terrain[k]) fprintf(stderr, "%s: %s\n", path, message);
     CHECK(terrain[k]);
-    if (k == 1) terrain[FILES] = levelled(bytes, n);
   }
-  CHECK(terrain[FILES]);
 }
 
 int main(int arguments, char *argument[]) {

@@ -179,7 +179,7 @@ SOIL = 3  # column of the soil law in the table of materials, followed by its pa
 SINKING = [1.0, 1e6, 1.0, 0.5, 0.0, 0.6, 0.01, 1e6, 0.0, 0.0]  # a soil that is valid
 
 
-def with_material(column: int, value: float, law: float = 0.0) -> bytes:
+def with_material(column: int, value: float, law: float = 0.0, kind: int = SMOOTH) -> bytes:
     """Returns a level grid of one material, whose table has another number in a column."""
     row = np.zeros(16)
     row[:3] = 0.5, NAN, NAN
@@ -189,7 +189,7 @@ def with_material(column: int, value: float, law: float = 0.0) -> bytes:
     return grid_bytes(
         np.zeros((3, 4)),
         cell=0.1,
-        kind=BLOCKS,
+        kind=kind,
         material=np.ones((3, 4), np.uint8),
         table=row[None],
     )
@@ -220,3 +220,8 @@ def test_a_number_of_a_material_out_of_its_range_is_named(
     with pytest.raises(ValueError, match="terrain grid") as caught:
         Ground(core, with_material(column, value, law))
     assert str(caught.value).startswith(f"terrain grid: table: {said}")
+
+
+def test_a_soil_of_blocks_is_refused(core: ct.CDLL) -> None:
+    with pytest.raises(ValueError, match="soil law of blocks: got 1, expected 0"):
+        Ground(core, with_material(SOIL, 1.0, 1.0, BLOCKS))

@@ -9,11 +9,13 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import nbformat
 from nbclient import NotebookClient
 from sphinx.cmd.build import main as sphinx
 
+import hexapod_cosim
 from hexapod_cosim.cosim.cli.extension import extensions_in, loaded
 from tools.docs import variables
 from tools.docs.stage import DOCS, ROOT, add_page, pages, write
@@ -65,8 +67,18 @@ def build(out: Path, *, work: Path, computed: bool = True) -> int:
     for extension in extensions_in(ROOT):
         for name, place in extension.site.items():
             loaded(place)(out / name)
+    write_walk_without_a_leg(out)
     options = ["-W", "--keep-going", "-q", "-n", "-E", "-j", "auto", "-c", str(DOCS)]
     return int(sphinx([*options, "-d", str(work / ".doctrees"), str(work), str(out)]))
+
+
+def write_walk_without_a_leg(out: Path) -> None:
+    """Writes lost_leg.html, the report of a walk that loses a leg, and its figures in plots/."""
+    with TemporaryDirectory() as folder:
+        walk = hexapod_cosim.simulate("lost_leg")
+        page = hexapod_cosim.report(walk, Path(folder) / "lost_leg")
+        shutil.copyfile(page, out / "lost_leg.html")
+        shutil.copytree(page.parent / "plots", out / "plots", dirs_exist_ok=True)
 
 
 def run_notebooks(folder: Path) -> None:

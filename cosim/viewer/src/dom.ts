@@ -23,3 +23,9 @@ export function listenToHelp(): () => void {
   byId("help-close")?.addEventListener("click", toggle);
   return toggle;
 }
+
+/** Returns a number as text with a true minus sign, and zero without any. */
+export function fixed(value: number, digits: number): string {
+  const text = value.toFixed(digits);
+  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
+}

@@ -1,11 +1,9 @@
-import plotStyle from "uplot/dist/uPlot.min.css";
 import { byId, element, listenToHelp } from "../../../cosim/viewer/src/dom";
 import { Theme } from "../../../cosim/viewer/src/theme";
 import { Drive, Keys } from "./drive";
 import type { Connection } from "./link";
 import type { Frame, Setup, World } from "./messages";
 import { Panel } from "./panel";
-import { Plots } from "./plots";
 import { Pusher, View } from "./view";
 
 const RISE = 0.1; // of the largest height, at a press of a key
@@ -13,11 +11,10 @@ const PACE = 0.05; // of the largest speed, at a press of a key
 
 /** Connects the page's parts with each other and with the loop. */
 export function start(setup: Setup, link: Connection): void {
-  document.head.append(element("style", "", plotStyle));
   const theme = new Theme(byId<HTMLButtonElement>("theme"));
   const drive = new Drive(link);
   const panel = new Panel(setup, link, drive);
-  const [plots, view] = [new Plots(byId("plots")!), makeView()];
+  const view = makeView();
   const shown: { world?: World; frame?: Frame } = {};
   link.on("world", (world) => {
     shown.world = world;
@@ -25,14 +22,10 @@ export function start(setup: Setup, link: Connection): void {
   });
   link.on("frame", (frame) => {
     shown.frame = frame;
-    plots.add(frame);
     panel.showFrame(frame);
     document.documentElement.dataset.ready = "true";
   });
-  theme.listen(() => {
-    view?.paint();
-    plots.repaint();
-  });
+  theme.listen(() => view?.paint());
   const keys = new Keys(drive, actionsOf(drive, panel, theme, view));
   listenToPad(keys);
   const pusher = view && new Pusher(view, link, () => shown.world?.weight ?? 0);
@@ -41,7 +34,6 @@ export function start(setup: Setup, link: Connection): void {
   const picture = (): void => {
     pusher?.renew();
     if (shown.frame) view?.draw(shown.frame);
-    plots.draw();
     requestAnimationFrame(picture);
   };
   requestAnimationFrame(picture);
@@ -53,7 +45,7 @@ function makeView(): View | undefined {
   try {
     return new View(byId("stage")!);
   } catch {
-    const text = "This browser has no WebGL, so the robot is not drawn. Keys and plots work.";
+    const text = "This browser has no WebGL, so the robot is not drawn. Keys work.";
     byId("stage")?.append(element("p", "refusal", text));
     return undefined;
   }

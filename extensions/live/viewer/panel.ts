@@ -1,9 +1,9 @@
-import { byId, element } from "../../../cosim/viewer/src/dom";
-import { fixed } from "../../../cosim/viewer/src/panels/heading";
+import { byId, element, fixed } from "../../../cosim/viewer/src/dom";
 import { bodyCommand, type Drive } from "./drive";
 import type { Connection, State } from "./link";
 import {
   type Frame,
+  footForces,
   type Lateness,
   type Settings,
   type Setup,
@@ -29,6 +29,7 @@ export class Panel {
   private status: Status | undefined;
   private forward = 0; // m/s    mean of the last time
   private turn = 0; // rad/s
+  private slip = 0; // m/s
   private time = 0; // s    of the last frame
 
   constructor(
@@ -78,8 +79,12 @@ export class Panel {
     const [forward, , turn] = speedOf(frame);
     this.forward += weight * (forward - this.forward);
     this.turn += weight * (turn - this.turn);
+    // of the fastest foot on the ground
+    const slips = footForces(frame).map(([, , up], leg) => (up > 0 ? frame.slip[leg] : 0));
+    this.slip += weight * (Math.max(...slips) - this.slip);
     text("speed-now", `${fixed(1e3 * this.forward, 0)} mm/s`);
     text("turn-now", `${fixed((180 / Math.PI) * this.turn, 0)} °/s`);
+    text("slip-now", `${fixed(1e3 * this.slip, 0)} mm/s`);
   }
 
   private showLateness({ factor, skipped }: Lateness): void {

@@ -1,7 +1,5 @@
 #include "footprints.h"
 
-#include "surface.h"
-
 #include <stddef.h>
 #include <string.h>
 
@@ -41,21 +39,13 @@ void hx_footprints_add(hxFootprintLog *log, const hxFootprint *print) {
   kept->count += 1.0;
 }
 
-/* Returns whether a footprint is on ground of the height of a point. */
-static int is_level(const hxTerrain *terrain, const hxFootprint *print, double x, double y) {
-  return !terrain ||
-         hx_terrain_is_level(terrain, (const double[]){print->x, print->y}, (const double[]){x, y});
-}
-
-double hx_footprints_depth(const hxFootprints *footprints, const hxTerrain *terrain, double x,
-                           double y) {
+double hx_footprints_depth(const hxFootprints *footprints, double x, double y) {
   const int number = hx_footprints_number(footprints);
   double depth = 0.0;
   for (int k = 0; k < number; ++k) {
     const hxFootprint *print = &footprints->print[k];
     const double dx = x - print->x, dy = y - print->y;
-    if (dx * dx + dy * dy <= print->radius * print->radius && print->depth > depth &&
-        is_level(terrain, print, x, y))
+    if (dx * dx + dy * dy <= print->radius * print->radius && print->depth > depth)
       depth = print->depth;
   }
   return depth;

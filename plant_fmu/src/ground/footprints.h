@@ -9,7 +9,6 @@
 
 #include "hexapod/hexapod.h"
 #include "hexapod/inside.h"
-#include "hexapod/terrain.h"
 
 HX_HIDDEN_BEGIN
 
@@ -38,10 +37,8 @@ void hx_footprints_take_back(hxFootprintLog *log);
 /* Adds a footprint; the oldest one is forgotten when the ring is full. */
 void hx_footprints_add(hxFootprintLog *log, const hxFootprint *print);
 
-/* Returns the depth of the deepest footprint around a point, 0 outside of all. Those on blocks of
- * another height do not count; terrain NULL: level ground. */
-double hx_footprints_depth(const hxFootprints *footprints, const hxTerrain *terrain, double x,
-                           double y);
+/* Returns the depth of the deepest footprint around a point, 0 outside of all. */
+double hx_footprints_depth(const hxFootprints *footprints, double x, double y);
 
 /* Returns how many footprints the ring holds. */
 int hx_footprints_number(const hxFootprints *footprints);

@@ -12,15 +12,14 @@
 
 _Static_assert(sizeof(hxSoils) == sizeof(hxSoil), "a soil consists of the same numbers");
 
-void hx_soil_compile(const hxSoilDefinition *d, const hxSoilShape *shape, hxSoil *soil) {
+void hx_soil_compile(const hxSoilDefinition *d, double radius, double pad_radius, hxSoil *soil) {
   double sine, cosine;
   memset(soil, 0, sizeof *soil);
   soil->law = d->law;
-  soil->pad = shape->pad_radius > 0.0 ? 1.0 : 0.0;
-  soil->radius = shape->pad_radius > 0.0 ? shape->pad_radius : shape->radius;
-  const double breadth = shape->breadth > 0.0 ? shape->breadth : soil->radius;
+  soil->pad = pad_radius > 0.0 ? 1.0 : 0.0;
+  soil->radius = pad_radius > 0.0 ? pad_radius : radius;
   soil->area = pi * (soil->radius * soil->radius);
-  soil->modulus = d->cohesive_modulus / breadth + d->frictional_modulus;
+  soil->modulus = d->cohesive_modulus / soil->radius + d->frictional_modulus;
   soil->exponent = d->exponent;
   soil->down = d->resistance * d->alpha_down;
   soil->side = d->resistance * d->alpha_side;
@@ -33,7 +32,7 @@ void hx_soil_compile(const hxSoilDefinition *d, const hxSoilShape *shape, hxSoil
   soil->damping = d->damping;
 }
 
-void hx_soil_from_row(const double row[13], const hxSoilShape *shape, hxSoil *soil) {
+void hx_soil_from_row(const double row[13], double radius, double pad_radius, hxSoil *soil) {
   const int law = HX_SOIL_NONE + (int)row[0];
   const hxSoilDefinition d = {.law = law,
                               .frictional_modulus = row[1],
@@ -54,7 +53,7 @@ void hx_soil_from_row(const double row[13], const hxSoilShape *shape, hxSoil *so
     soil->law = law;
     return;
   }
-  hx_soil_compile(&d, shape, soil);
+  hx_soil_compile(&d, radius, pad_radius, soil);
   soil->friction = row[5];
 }
 

@@ -27,20 +27,13 @@ typedef struct hxSoil {
   double damping;            /* Pa s/m  R */
 } hxSoil;
 
-/* Shape of what sinks. */
-typedef struct {
-  double radius; /* m  of the sphere */
-  double
-      pad_radius; /* m  of a flat round pad in its place, or of a disc of a pad's area; 0: none */
-  double breadth; /* m  b of eq. 40; 0: the radius */
-} hxSoilShape;
-
-/* Computes the constants of a soil under a shape. */
-void hx_soil_compile(const hxSoilDefinition *definition, const hxSoilShape *shape, hxSoil *soil);
+/* Computes the constants of a soil under feet; pad_radius 0: spheres of a radius, m. */
+void hx_soil_compile(const hxSoilDefinition *definition, double radius, double pad_radius,
+                     hxSoil *soil);
 
 /* Does the same from columns 3 to 15 of a material of a grid's table (table_row of
  * models/soil/law.py). */
-void hx_soil_from_row(const double row[13], const hxSoilShape *shape, hxSoil *soil);
+void hx_soil_from_row(const double row[13], double radius, double pad_radius, hxSoil *soil);
 
 /* Returns the first of these columns that is not in its range, -1 if there is none. */
 int hx_soil_row_error(const double row[13]);

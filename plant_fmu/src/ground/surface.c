@@ -105,6 +105,9 @@ static int check_materials(const hxTerrain *terrain, char *message) {
       return refuse(message, "table: stiffness", row[HX_MATERIAL_STIFFNESS],
                     "1e-3 to 1e14 N/m^1.5, or NaN");
     const int column = hx_soil_row_error(row + HX_MATERIAL_SOIL);
+    if (terrain->head.kind == HX_SURFACE_BLOCKS && row[HX_MATERIAL_SOIL] != 0.0)
+      return refuse(message, "table: soil law of blocks", row[HX_MATERIAL_SOIL],
+                    "0: blocks are rigid; use a smooth surface");
     if (column == 0)
       return refuse(message, "table: soil law", row[HX_MATERIAL_SOIL], "0, 1, 2 or 3");
     if (column > 0)
@@ -331,35 +334,6 @@ double hx_terrain_outside(const hxTerrain *terrain, const double point[3], const
   const hxGridHead *head = &terrain->head;
   return fmax(outside_along(point[0], head->x0, head->cell, cell[0], head->cols),
               outside_along(point[1], head->y0, head->cell, cell[1], head->rows));
-}
-
-void hx_terrain_move_into(const hxTerrain *terrain, const double cell[2], double *x, double *y) {
-  const hxGridHead *head = &terrain->head;
-  const double rim = 1e-6 * head->cell;
-  const double left = head->x0 + cell[0] * head->cell, low = head->y0 + cell[1] * head->cell;
-  *x = fmin(fmax(*x, left + rim), left + head->cell - rim);
-  *y = fmin(fmax(*y, low + rim), low + head->cell - rim);
-}
-
-int hx_terrain_is_uneven(const hxTerrain *terrain, const double point[3]) {
-  double cell[2];
-  int found = 0;
-  if (terrain->head.kind != HX_SURFACE_BLOCKS) return 0;
-  hx_terrain_cell_at(terrain, point, cell);
-  const double height = hx_terrain_column(terrain, cell[0], cell[1]);
-  for (int i = -1; i <= 1; ++i)
-    for (int j = -1; j <= 1; ++j)
-      found |= hx_terrain_column(terrain, cell[0] + i, cell[1] + j) != height;
-  return found;
-}
-
-int hx_terrain_is_level(const hxTerrain *terrain, const double a[2], const double b[2]) {
-  const double points[2][3] = {{a[0], a[1], 0.0}, {b[0], b[1], 0.0}};
-  double cell[2][2];
-  if (terrain->head.kind != HX_SURFACE_BLOCKS) return 1;
-  for (int i = 0; i < 2; ++i) hx_terrain_cell_at(terrain, points[i], cell[i]);
-  return hx_terrain_column(terrain, cell[0][0], cell[0][1]) ==
-         hx_terrain_column(terrain, cell[1][0], cell[1][1]);
 }
 
 /* A cell: its column and row, the height of its top, and the ways to those beside it, 0 at the

@@ -45,30 +45,14 @@ typedef struct hxFace {
 hxTerrainSurface hx_terrain_surface(const hxTerrain *terrain);
 double hx_terrain_cell_size(const hxTerrain *terrain);
 
-/* Returns whether the block below a point is higher or lower than a neighbour. */
-int hx_terrain_is_uneven(const hxTerrain *terrain, const double point[3]);
-
-/* Returns whether the ground is level between two points: smooth, or of blocks of one height. */
-int hx_terrain_is_level(const hxTerrain *terrain, const double a[2], const double b[2]);
-
 /* Returns the cell (column, row) of blocks over which a point is, and how far outside of a cell a
  * point is, m, < 0 inside; the border's cells have no outer edge. */
 void hx_terrain_cell_at(const hxTerrain *terrain, const double point[3], double cell[2]);
 double hx_terrain_outside(const hxTerrain *terrain, const double point[3], const double cell[2]);
 
-/* Moves x and y to the nearest place over a cell. */
-void hx_terrain_move_into(const hxTerrain *terrain, const double cell[2], double *x, double *y);
-
 /* Returns the index along a line of n cells of a coordinate in cells, of the border's beyond it. */
 static inline int64_t hx_cell_index(double u, int64_t n) {
   return !(u > 0.0) ? 0 : u >= (double)(n - 1) ? n - 1 : (int64_t)u; /* NaN: 0 */
-}
-
-/* Returns the height of the top of a cell of blocks, of the border's where there is none. */
-static inline double hx_terrain_column(const hxTerrain *terrain, double col, double row) {
-  const hxGridHead *head = &terrain->head;
-  const int64_t c = hx_cell_index(col, head->cols), r = hx_cell_index(row, head->rows);
-  return terrain->height[r * head->cols + c];
 }
 
 static inline double hx_higher_of(double a, double b) { return a < b ? b : a; }

@@ -20,10 +20,6 @@ static void kernel_start(const hxModel *model, double t, hxState *state, void *s
   hxDepths depths;
   hx_contact_release(&state->contact);
   hx_depths_of(model, &state->contact, &state->motion, &depths);
-  if (model->has_soil && model->torso_rows) {
-    hx_moment_update(model, state);
-    hx_torso_sides(&state->motion, &state->moment, &depths);
-  }
   hx_contact_start(model, &depths, &state->contact);
   memset(state->motion.bristle, 0, sizeof state->motion.bristle);
   hx_dynamics_forces(model, &state->contact, &no_command, t, &state->motion, NULL, 0, 1, work);
@@ -163,7 +159,7 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   if (model->has_soil) {
     path.ends = &scratch->soil;
     hx_soil_ends(&state->contact, &state->moment, end, 0, &scratch->soil);
-    hx_soil_yield(model, &state->contact, h, &state->moment, end, path.ends, path.plastic);
+    hx_soil_yield(&state->contact, h, &state->moment, end, path.ends, path.plastic);
   }
   trapezoidal_impulses(model, &scratch->work, h, &state->completed, &impulses);
   if (!known)

@@ -109,29 +109,14 @@ HX_INLINE void soil_load(hxMask soft, const hxSoilPack *f, hxContactWork *contac
   contact->normal.elastic = hx_select(soft, f->held, contact->normal.elastic);
 }
 
-/* Replaces the forces on torso, knees and shanks by those of soil where they touched down on it:
- * f_n along the normal and the whole shear -T_max tanh(k_t v)/v v_t across it (eq. 44-46). They
- * have no bristles. */
-HX_RARE void replace_body_by_soil(const hxModel *model, const hxContactState *state, int row,
-                                  int slot, hxContactWork *contact) {
-  const hxMask soft = hx_on_soil(state, row, slot);
-  const hxContactKinematics *kin = &contact->kin;
-  const hxSoilPack f = hx_soil_pack(state, row, slot, kin->delta, kin->ddelta, NULL);
-  const hxReal drag = f.shear * hx_per_speed(model, contact->slip_speed);
-  soil_load(soft, &f, contact);
-  contact->drag = hx_select(soft, drag, contact->drag);
-  contact->force = select3(
-      soft, hx_add_scaled(hx_scale(f.force, kin->normal), -drag, contact->slip), contact->force);
-}
-
 /* Replaces the forces on feet by those of soil where they touched down on it: f_n along the normal
  * and the shear -(T_0 + f_n tan phi) b/K across it (eq. 44-47). */
 HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, int slot,
                              const hxPlantMotion *motion, const hxSoilCurves *virgin,
                              hxContactWork *contact) {
-  const hxMask soft = hx_on_soil(state, HX_FOOT, slot);
+  const hxMask soft = hx_on_soil(state, slot);
   const hxContactKinematics *kin = &contact->kin;
-  const hxSoilPack f = hx_soil_pack(state, HX_FOOT, slot, kin->delta, kin->ddelta, virgin);
+  const hxSoilPack f = hx_soil_pack(state, slot, kin->delta, kin->ddelta, virgin);
   const hxVec3 b = hx_load_vec3(motion->bristle, slot), none = hx_zero3();
   const hxReal zero = hx_splat(0.0), yield = f.per_displacement * contact->slip_speed;
   const hxBristle rigid = has_friction_bristles(model, HX_FOOT)
@@ -250,10 +235,7 @@ HX_RARE void hx_foot_shares(const hxModel *model, const hxContactState *state, i
   int row_of[HX_SHARERS];
   for (int row = HX_FOOT; row < HX_FOOT_ROWS; ++row) {
     share[row] = 1.0;
-    if (hx_re(state->closed[row][slot]) == 0.0 || !(hx_re(face[row].delta) > 0.0) ||
-        (row == HX_FOOT && model->has_soil &&
-         hx_re(state->on_soil[hx_soil_row(HX_FOOT)][slot]) != 0.0))
-      continue;
+    if (hx_re(state->closed[row][slot]) == 0.0 || !(hx_re(face[row].delta) > 0.0)) continue;
     row_of[of.count] = row;
     of.depth[of.count] = face[row].delta;
     for (int i = 0; i < 3; ++i) of.normal[of.count][i] = face[row].normal[i];
@@ -290,11 +272,7 @@ HX_INLINE void hx_contact_force(const hxModel *model, const hxContactState *stat
                                 int slot, const hxPlantMotion *motion, const hxSoilCurves *virgin,
                                 hxContactWork *contact) {
   rigid_force(model, row, slot, motion, hx_friction_at(state, row, slot), contact);
-  if (!has_soil(model, row)) return;
-  if (row == HX_FOOT)
-    replace_by_soil(model, state, slot, motion, virgin, contact);
-  else
-    replace_body_by_soil(model, state, row, slot, contact);
+  if (has_soil(model, row)) replace_by_soil(model, state, slot, motion, virgin, contact);
 }
 
 /* Computes the moment of spin and rolling friction on bodies that turn at w; the normal forces are

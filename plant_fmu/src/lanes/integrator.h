@@ -183,7 +183,7 @@ static void measure_step(const hxStart *start, const hxModel *seen, double h, co
     hxSoilEnds *ends = &start->scratch->soil;
     path.ends = ends;
     hx_soil_ends(start->contact, &state->moment, end, start->scratch->is_soil_known, ends);
-    hx_soil_yield(start->near, start->contact, h, &state->moment, end, ends, path.plastic);
+    hx_soil_yield(start->contact, h, &state->moment, end, ends, path.plastic);
   }
   hx_step_works(&path, &trial->impulses, &works);
   hxMeasured *measured = &state->measured;
@@ -273,7 +273,7 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   *event = hx_switch_contacts(seen, &depths, start->t + *taken, &state->moment, start->footprints,
                               state);
   if (*event && model->foot_rows > 1) hx_moment_shares(model, &state->contact, &state->moment);
-  start->scratch->is_soil_known = model->has_soil && !*event && !hx_has_cells(model);
+  start->scratch->is_soil_known = model->has_soil && !*event;
   return HX_OK;
 }
 

@@ -214,7 +214,7 @@ static void fill_foot(const hxModel *model, const hxState *state, const hxLegWor
   o->foot.peak_force_rate[leg] = state->measured.peak_rate[leg];
   o->foot.landing_rate[leg] = state->measured.landing_rate[leg];
   o->foot.landings[leg] = state->measured.landings[leg];
-  o->foot.sinkage[leg] = state->contact.plastic[hx_soil_row(HX_FOOT)][leg];
+  o->foot.sinkage[leg] = state->contact.plastic[leg];
   o->foot.contact[leg] = state->contact.closed[HX_FOOT][leg] != 0.0;
   for (int k = 1; k < model->foot_rows; ++k)
     add_foot_row(model, state, &work->contact[model->row[k]], model->row[k], lane, leg, o);
@@ -396,8 +396,8 @@ static int cone_bin(double share) {
 static double cone_limit(const hxModel *model, const hxContactState *state,
                          const hxContactWork *foot, int row, int leg, int lane) {
   const double force = hx_lane(foot->normal.force, lane);
-  if (!has_soil(model, row) || !is_in_soil(state, row, leg)) return state->mu[row][leg] * force;
-  const hxSoil soil = hx_soil_under(state, row, leg);
+  if (!has_soil(model, row) || !is_in_soil(state, leg)) return state->mu[row][leg] * force;
+  const hxSoil soil = hx_soil_under(state, leg);
   return soil.friction * force + hx_lane(foot->hold, lane) / soil.per_displacement;
 }
 

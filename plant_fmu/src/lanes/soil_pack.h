@@ -11,32 +11,31 @@
 
 _Static_assert(sizeof(hxSoil) == HX_SOIL_SIZE * sizeof(double), "a soil consists of numbers");
 
-/* Returns whether a row of contacts may be on soil. */
+/* Returns whether a row of contacts may be on soil: that of feet with the ground below them. */
 static inline int has_soil(const hxModel *model, int row) {
-  return model->has_soil && hx_may_sink(row);
+  return model->has_soil && row == HX_FOOT;
 }
 
-/* Returns which contacts of a row touched down on soil. */
-static inline hxMask hx_on_soil(const hxContactState *state, int row, int slot) {
-  return hx_less(hx_splat(0.0), hx_load(&state->on_soil[hx_soil_row(row)][slot]));
+/* Returns which feet touched down on soil. */
+static inline hxMask hx_on_soil(const hxContactState *state, int slot) {
+  return hx_less(hx_splat(0.0), hx_load(&state->on_soil[slot]));
 }
 
-/* Returns the soil on which a contact touched down. */
-static inline hxSoil hx_soil_under(const hxContactState *state, int row, int slot) {
+/* Returns the soil on which a foot touched down. */
+static inline hxSoil hx_soil_under(const hxContactState *state, int slot) {
   hxSoil soil;
   double numbers[HX_SOIL_SIZE];
-  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_re(state->soil[hx_soil_row(row)][i][slot]);
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_re(state->soil[i][slot]);
   memcpy(&soil, numbers, sizeof soil);
   return soil;
 }
 
-/* Returns whether a contact is closed and on soil. */
-static inline int is_in_soil(const hxContactState *state, int row, int slot) {
-  return hx_re(state->closed[row][slot]) != 0.0 &&
-         hx_re(state->on_soil[hx_soil_row(row)][slot]) != 0.0;
+/* Returns whether a foot's contact is closed and on soil. */
+static inline int is_in_soil(const hxContactState *state, int slot) {
+  return hx_re(state->closed[HX_FOOT][slot]) != 0.0 && hx_re(state->on_soil[slot]) != 0.0;
 }
 
-/* Forces of soil on a pack of contacts; 0 on those that do not touch it. */
+/* Forces of soil on a pack of feet; 0 on those that do not touch it. */
 typedef struct {
   hxReal force;                /* N      f_n */
   hxReal stiffness, viscosity; /* N/m, N s/m  its derivatives by depth and sinking speed */
@@ -44,46 +43,41 @@ typedef struct {
   hxReal stored;               /* J      that unloading gives back */
   hxReal hold, per_load;       /* N/m, 1/m  shear over the bristle: without load, of the load */
   hxReal per_displacement;     /* 1/m    1/K */
-  hxReal shear;                /* N      T_max */
 } hxSoilPack;
 
-/* Returns the soils on which the contacts of a row touched down. */
-static inline hxSoils hx_soils_under(const hxContactState *state, int row, int slot) {
+/* Returns the soils on which a pack of feet touched down. */
+static inline hxSoils hx_soils_under(const hxContactState *state, int slot) {
   hxSoils soils;
   hxReal numbers[HX_SOIL_SIZE];
-  const hxNumber(*of_row)[HX_SLOTS] = state->soil[hx_soil_row(row)];
-  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_load(&of_row[i][slot]);
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_load(&state->soil[i][slot]);
   memcpy(&soils, numbers, sizeof soils);
   return soils;
 }
 
-/* Returns which contacts of a row are closed and on soil. */
-static inline hxMask hx_in_soil(const hxContactState *state, int row, int slot) {
-  return hx_on_soil(state, row, slot) & hx_less(hx_splat(0.0), hx_load(&state->closed[row][slot]));
+/* Returns which feet have a closed contact on soil. */
+static inline hxMask hx_in_soil(const hxContactState *state, int slot) {
+  return hx_on_soil(state, slot) & hx_less(hx_splat(0.0), hx_load(&state->closed[HX_FOOT][slot]));
 }
 
-/* Returns the forces on a row at these depths and sinking speeds; virgin: the virgin curves there,
+/* Returns the forces on feet at these depths and sinking speeds; virgin: the virgin curves there,
  * NULL: not known. */
-HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int row, int slot, hxReal delta,
-                                hxReal ddelta, const hxSoilCurves *virgin) {
+HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int slot, hxReal delta, hxReal ddelta,
+                                const hxSoilCurves *virgin) {
   const hxReal none = hx_splat(0.0);
-  const hxMask in = hx_in_soil(state, row, slot);
-  if (!hx_any(in)) return (hxSoilPack){none, none, none, none, none, none, none, none, none};
-  const hxSoils soil = hx_soils_under(state, row, slot);
+  const hxMask in = hx_in_soil(state, slot);
+  if (!hx_any(in)) return (hxSoilPack){none, none, none, none, none, none, none, none};
+  const hxSoils soil = hx_soils_under(state, slot);
   const hxReal z = hx_select(in, delta, none);
-  const hxSoilContacts f = hx_soil_contacts(&soil, hx_load(&state->plastic[hx_soil_row(row)][slot]),
-                                            z, ddelta, virgin ? *virgin : hx_virgin(&soil, z));
-  return (hxSoilPack){
-      .force = hx_select(in, f.normal.force, none),
-      .stiffness = hx_select(in, f.normal.stiffness, none),
-      .viscosity = hx_select(in, f.normal.viscosity, none),
-      .held = hx_select(in, f.held, none),
-      .stored = hx_select(in, f.stored, none),
-      .hold = hx_select(in, f.hold, none),
-      .per_load = hx_select(in, soil.friction * soil.per_displacement, none),
-      .per_displacement = hx_select(in, soil.per_displacement, none),
-      .shear =
-          hx_select(in, soil.friction * f.normal.force + f.hold / soil.per_displacement, none)};
+  const hxSoilContacts f = hx_soil_contacts(&soil, hx_load(&state->plastic[slot]), z, ddelta,
+                                            virgin ? *virgin : hx_virgin(&soil, z));
+  return (hxSoilPack){.force = hx_select(in, f.normal.force, none),
+                      .stiffness = hx_select(in, f.normal.stiffness, none),
+                      .viscosity = hx_select(in, f.normal.viscosity, none),
+                      .held = hx_select(in, f.held, none),
+                      .stored = hx_select(in, f.stored, none),
+                      .hold = hx_select(in, f.hold, none),
+                      .per_load = hx_select(in, soil.friction * soil.per_displacement, none),
+                      .per_displacement = hx_select(in, soil.per_displacement, none)};
 }
 
 #endif

@@ -5,20 +5,15 @@
 
 #include "forces.h"
 
-/* Replaces the derivatives of the forces on a row by those of soil where it touched down on it. */
-HX_RARE hxContactSlope with_soil_slope(const hxModel *model, const hxContactState *state, int row,
-                                       int slot, hxReal deeper, const hxContactWork *contact,
-                                       const hxImplicit *implicit, hxContactSlope rigid) {
-  const hxMask soft = hx_on_soil(state, row, slot);
-  const hxSoilPack ahead = hx_soil_pack(state, row, slot, deeper, contact->kin.ddelta, NULL);
+/* Replaces the derivatives of the forces on feet by those of soil where it touched down on it. */
+HX_RARE hxContactSlope with_soil_slope(const hxContactState *state, int slot, hxReal deeper,
+                                       const hxContactWork *contact, const hxImplicit *implicit,
+                                       hxContactSlope rigid) {
+  const hxMask soft = hx_on_soil(state, slot);
+  const hxSoilPack ahead = hx_soil_pack(state, slot, deeper, contact->kin.ddelta, NULL);
   hxContactSlope slope = rigid;
   slope.stiffness = hx_select(soft, ahead.stiffness, rigid.stiffness);
   slope.viscosity = hx_select(soft, ahead.viscosity, rigid.viscosity);
-  if (row != HX_FOOT) { /* no bristles */
-    slope.drag =
-        hx_select(soft, ahead.shear * hx_per_speed(model, contact->slip_speed), rigid.drag);
-    return slope;
-  }
   const hxReal yield = contact->bristle.yield,
                bristle = (ahead.force * ahead.per_load + ahead.hold) / (1.0 + implicit->z * yield);
   slope.drag = hx_select(soft, implicit->z * bristle, rigid.drag);
@@ -43,16 +38,14 @@ HX_INLINE hxContactSlope contact_slope(const hxModel *model, const hxContactStat
   if (!has_friction_bristles(model, row)) {
     slope.drag = ahead.force * contact->drag_per_load;
     slope.bristle = slope.yield = hx_splat(0.0);
-    return has_soil(model, row)
-               ? with_soil_slope(model, state, row, slot, deeper, contact, implicit, slope)
-               : slope;
+    return has_soil(model, row) ? with_soil_slope(state, slot, deeper, contact, implicit, slope)
+                                : slope;
   }
   slope.yield = contact->bristle.yield;
   slope.bristle = ahead.force * contact->bristle.stiffness / (1.0 + implicit->z * slope.yield);
   slope.drag = ahead.force * contact->bristle.damping + implicit->z * slope.bristle;
-  return has_soil(model, row)
-             ? with_soil_slope(model, state, row, slot, deeper, contact, implicit, slope)
-             : slope;
+  return has_soil(model, row) ? with_soil_slope(state, slot, deeper, contact, implicit, slope)
+                              : slope;
 }
 
 /* Stores them for all stages of a step. */
@@ -329,7 +322,7 @@ static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *st
   const hxReal yield = implicit->slope[pack].contact[HX_FOOT].yield;
   hxReal closed = hx_load(&state->closed[HX_FOOT][pack * HX_LANES]);
   if (!has_friction_bristles(model, HX_FOOT)) /* rigid ground beside soil has no bristles */
-    closed *= hx_load(&state->on_soil[hx_soil_row(HX_FOOT)][pack * HX_LANES]);
+    closed *= hx_load(&state->on_soil[pack * HX_LANES]);
   rate = hx_add_scaled(rate, closed, hx_add_scaled(dv, -hx_dot(n, dv), n));
   if (implicit->change)
     rate = hx_add_scaled(rate, -yield,

@@ -161,14 +161,12 @@ HX_INLINE hxReal share_within(const hxPath *path, int row, int leg, hxReal x) {
 }
 
 /* Returns the normal forces of a leg's contact with soil, N, samples in lanes. */
-HX_RARE hxReal soil_within(const hxPath *path, int row, int leg, const hxReal *depth,
-                           const hxReal *rate) {
+HX_RARE hxReal soil_within(const hxPath *path, int leg, const hxReal *depth, const hxReal *rate) {
   hxSoils soil;
   hxReal numbers[HX_SOIL_SIZE];
-  const int soft = hx_soil_row(row);
-  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_splat(path->contact->soil[soft][i][leg]);
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_splat(path->contact->soil[i][leg]);
   memcpy(&soil, numbers, sizeof soil);
-  return hx_soil_forces(&soil, hx_splat(path->contact->plastic[soft][leg]), *depth, *rate / path->h,
+  return hx_soil_forces(&soil, hx_splat(path->contact->plastic[leg]), *depth, *rate / path->h,
                         hx_virgin(&soil, *depth))
       .force;
 }
@@ -180,8 +178,8 @@ HX_INLINE hxReal force_within(const hxPath *path, int row, int leg, hxReal x) {
   const hxCubic depth = cubic(hx_splat(delta), hx_splat(h * from->ddelta[leg]),
                               hx_splat(to->delta[leg] - delta), hx_splat(h * to->ddelta[leg]), x);
   const hxContactState *contact = path->contact;
-  if (has_soil(path->model, row) && is_in_soil(contact, row, leg))
-    return soil_within(path, row, leg, &depth.value, &depth.rate);
+  if (has_soil(path->model, row) && is_in_soil(contact, leg))
+    return soil_within(path, leg, &depth.value, &depth.rate);
   hxContactLawAt law = {hx_splat(contact->closed[row][leg]), hx_splat(contact->damping[row][leg]),
                         hx_splat(contact->stiffness[row][leg])};
   if (has_shares(path, row)) law.stiffness *= share_within(path, row, leg, x);
@@ -236,11 +234,11 @@ static inline int hx_has_cone(const hxModel *model) {
 
 /* Returns the largest impulse of friction, on soil of shear (eq. 46), under a normal impulse. */
 HX_RARE hxReal cone_with_soil(const hxPath *path, int slot, hxReal along, hxReal rigid) {
-  const hxMask in = hx_in_soil(path->contact, HX_FOOT, slot);
+  const hxMask in = hx_in_soil(path->contact, slot);
   if (!hx_any(in)) return rigid;
   const hxReal from = hx_load(&path->from->contact[HX_FOOT].delta[slot]),
                to = hx_load(&path->to->contact[HX_FOOT].delta[slot]);
-  const hxSoils soil = hx_soils_under(path->contact, HX_FOOT, slot);
+  const hxSoils soil = hx_soils_under(path->contact, slot);
   const hxReal z = hx_max(0.5 * (from + to), hx_splat(0.0));
   return hx_select(in, soil.friction * along + path->h * hx_shear_base(&soil, z), rigid);
 }

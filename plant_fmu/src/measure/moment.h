@@ -10,8 +10,6 @@
 
 enum { LANDING_SAMPLES = 200 }; /* samples of a landing, which lasts 20 ms */
 
-static const double same_depth = 1e-6; /* m  of a foot in the faces around two blocks */
-
 /* Stores a row of contacts of bodies with centres of mass r and angular velocities w. */
 HX_INLINE void store_contact_moment(const hxModel *model, const hxContactKinematics *kin, int row,
                                     int slot, hxVec3 r, hxVec3 w, hxContactMoment *moment) {
@@ -179,37 +177,11 @@ static inline void hx_copy_moment(const hxModel *model, hxMoment *to, const hxMo
   if (model->foot_rows > 1) memcpy(to->share, from->share, sizeof to->share);
 }
 
-/* Returns whether a foot off its block would be deeper in the faces around another cell. */
-HX_RARE int is_deeper_in(const hxModel *model, const hxContactState *state, int leg,
-                         const double cell[2], const double centre[3], int with_top) {
-  const double own[2] = {state->cell[0][leg], state->cell[1][leg]};
-  return hx_depth_around(model, cell, centre, with_top) >
-         hx_depth_around(model, own, centre, with_top) + same_depth;
-}
-
-/* Returns whether a foot that was dragged off its block in soil keeps it. It may have passed
- * through others, and no face may begin at a depth: it does not change to a block in whose faces it
- * is deeper than in those around its own. In soil or above the bottom of its print it changes to a
- * level block beside its own alone. */
-HX_RARE int keeps_block(const hxModel *model, const hxContactState *state, int leg,
-                        const double centre[3]) {
-  const hxTerrain *terrain = model->terrain;
-  const double own[2] = {state->cell[0][leg], state->cell[1][leg]};
-  double cell[2];
-  hx_terrain_cell_at(terrain, centre, cell);
-  if (!is_in_soil(state, HX_FOOT, leg) && !(state->plastic[hx_soil_row(HX_FOOT)][leg] > 0.0))
-    return is_deeper_in(model, state, leg, cell, centre, 1);
-  if (fabs(cell[0] - own[0]) > 1.0 || fabs(cell[1] - own[1]) > 1.0 ||
-      hx_terrain_column(terrain, cell[0], cell[1]) != hx_terrain_column(terrain, own[0], own[1]))
-    return 1;
-  return is_deeper_in(model, state, leg, cell, centre, 0);
-}
-
-/* Copies the places of feet, and of bodies where the ground has materials or soil, and computes how
+/* Copies the places of feet, and of bodies where the ground has materials, and computes how
  * far feet are outside of their cells. */
 HX_RARE void places_on_grid(const hxModel *model, const hxContactState *state,
                             const hxMoment *moment, hxDepths *depths) {
-  const int cells = hx_has_cells(model), materials = model->terrain->material || model->has_soil;
+  const int cells = hx_has_cells(model), materials = model->terrain->material != NULL;
   const hxNumber(*foot)[HX_SLOTS] = moment->contact[HX_FOOT].centre;
   memcpy(depths->centre[HX_FOOT], foot, sizeof depths->centre[HX_FOOT]);
   for (int k = 1; materials && k < model->rows + model->torso_rows; ++k)
@@ -220,8 +192,6 @@ HX_RARE void places_on_grid(const hxModel *model, const hxContactState *state,
                  cell[2] = {state->cell[0][leg], state->cell[1][leg]};
     depths->outside[leg] =
         cells && cell[0] >= 0.0 ? hx_terrain_outside(model->terrain, centre, cell) : -hx_far;
-    if (depths->outside[leg] > 0.0 && model->has_soil && keeps_block(model, state, leg, centre))
-      depths->outside[leg] = -hx_far;
   }
 }
 
@@ -233,7 +203,7 @@ static inline void hx_depths_of_moment(const hxModel *model, const hxContactStat
     memcpy(depths->delta[model->row[k]], contact->delta, sizeof contact->delta);
     memcpy(depths->ddelta[model->row[k]], contact->ddelta, sizeof contact->ddelta);
   }
-  if (model->has_soil) hx_depths_on_soil(model, state, depths);
+  if (model->has_soil) hx_depths_on_soil(state, depths);
   if (model->terrain) places_on_grid(model, state, moment, depths);
 }
 
@@ -293,20 +263,6 @@ static inline void start_landing(int slot, double t, hxMeasured *measured) {
   for (int i = 0; i < HX_RISE_SAMPLES; ++i) measured->landing_force[i][slot] = 0.0;
 }
 
-/* Finds the side of the torso's box that faces the ground at each corner. */
-HX_RARE void hx_torso_sides(const hxPlantMotion *motion, const hxMoment *at, hxDepths *depths) {
-  const hxMat3 R_WB = hx_torso_body(motion).R_WB;
-  const hxNumber(*normal)[HX_SLOTS] = at->contact[HX_TORSO].normal;
-  for (int slot = 0; slot < HX_SLOTS; ++slot) {
-    const hxVec3 n = hx_splat_vec3((hxNumber[]){normal[0][slot], normal[1][slot], normal[2][slot]});
-    const hxVec3 n_B = hx_tmul(R_WB, n);
-    const double x = fabs(hx_re(hx_lane(n_B.x, 0))), y = fabs(hx_re(hx_lane(n_B.y, 0))),
-                 z = fabs(hx_re(hx_lane(n_B.z, 0)));
-    const int side = y > x ? 1 : 0;
-    depths->side[slot] = z > fmax(x, y) ? 2 : side;
-  }
-}
-
 /* Switches the contacts that are due at time t, records footprints and starts the measurement of
  * landings; returns whether contacts switched. Depths are relative to those at which they
  * touch the ground; `at` is the moment of time t. */
@@ -315,7 +271,6 @@ static inline int hx_switch_contacts(const hxModel *model, hxDepths *depths, dou
                                      hxState *state) {
   if (model->has_soil) hx_soil_switch(model, at, depths, footprints, &state->contact);
   if (!hx_contact_is_due(model, depths, &state->contact)) return 0;
-  if (model->has_soil && model->torso_rows) hx_torso_sides(&state->motion, at, depths);
   int before[HX_SLOTS], after[HX_SLOTS];
   feet_on_ground(model, &state->contact, before);
   if (model->foot_rows > 1) {

@@ -19,8 +19,8 @@ typedef struct {
   const hxCommand *command[INTERVALS + 1]; /* commands at its nodes */
   double t, h;                             /* s  start and length */
   const hxMoment *from, *to;
-  double plastic[HX_SOIL_ROWS][HX_SLOTS]; /* m  plastic depths at its end; set with soil */
-  const hxSoilEnds *ends;                 /* set with soil */
+  double plastic[HX_SLOTS]; /* m  plastic depths of feet at its end; set with soil */
+  const hxSoilEnds *ends;   /* set with soil */
 } hxPath;
 
 /* Cubic through values and rates (per step) at both ends, x in [0, 1]: value, first and second

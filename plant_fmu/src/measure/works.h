@@ -42,24 +42,20 @@ static inline hxVec3 approach_of(const hxContactMoment *moment, int slot) {
                   hx_load_vec3((const double (*)[HX_SLOTS])moment->normal, slot));
 }
 
-/* Returns the growth of the energy stored in a row of contacts, in soil where they touched down on
- * it, J. */
-HX_RARE hxReal growth_with_soil(const hxPath *path, int row, int slot, hxReal rigid) {
+/* Returns the growth of the energy stored under feet, in soil where they touched down on it, J. */
+HX_RARE hxReal growth_with_soil(const hxPath *path, int slot, hxReal rigid) {
   const hxContactState *state = path->contact;
-  const int soft = hx_soil_row(row);
-  const hxMask in = hx_in_soil(state, row, slot);
+  const hxMask in = hx_in_soil(state, slot);
   if (!hx_any(in)) return rigid;
-  const hxSoils soil = hx_soils_under(state, row, slot);
-  const hxReal from = hx_load(&path->from->contact[row].delta[slot]),
-               to = hx_load(&path->to->contact[row].delta[slot]);
-  const int pack = slot / HX_LANES, is_foot = row == HX_FOOT;
-  const hxSoilCurves virgin_from = is_foot ? path->ends->from[pack] : hx_virgin(&soil, from),
-                     virgin_to = is_foot ? path->ends->to[pack] : hx_virgin(&soil, to);
-  return hx_select(
-      in,
-      hx_stored_energy(&soil, hx_load(&path->plastic[soft][slot]), to, virgin_to) -
-          hx_stored_energy(&soil, hx_load(&state->plastic[soft][slot]), from, virgin_from),
-      rigid);
+  const hxSoils soil = hx_soils_under(state, slot);
+  const int pack = slot / HX_LANES;
+  const hxReal before = hx_stored_energy(&soil, hx_load(&state->plastic[slot]),
+                                         hx_load(&path->from->contact[HX_FOOT].delta[slot]),
+                                         path->ends->from[pack]),
+               after = hx_stored_energy(&soil, hx_load(&path->plastic[slot]),
+                                        hx_load(&path->to->contact[HX_FOOT].delta[slot]),
+                                        path->ends->to[pack]);
+  return hx_select(in, after - before, rigid);
 }
 
 /* Computes what a row of contacts and its friction lose in a step with these impulses (eq. 27). */
@@ -78,7 +74,7 @@ HX_INLINE void contact_works(const hxPath *path, int row, int slot, hxVec3 impul
     after *= hx_load(&path->to->share[row][slot]);
   }
   hxReal stored = after - before;
-  if (has_soil(path->model, row)) stored = growth_with_soil(path, row, slot, stored);
+  if (has_soil(path->model, row)) stored = growth_with_soil(path, slot, stored);
   *contact = taken - stored;
   *friction = -hx_dot(impulse, slip);
 }

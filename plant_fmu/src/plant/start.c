@@ -19,6 +19,12 @@ hxStatus hx_plant_check_terrain(hxPlant *plant, const hxDefinition *d, char *mes
   const double radius = fmax(fmax(d->foot_radius, d->body.corner_radius),
                              fmax(d->body.knee_radius, d->body.shank_radius));
   const double cell = hx_terrain_cell_size(plant->terrain);
+  if (hx_terrain_surface(plant->terrain) == HX_SURFACE_BLOCKS && d->soil.law != HX_SOIL_NONE) {
+    hx_print(message, HX_MESSAGE_SIZE,
+             "soil.law: got a soil on blocks, expected none, because blocks are rigid; choose a "
+             "smooth grid, flat or slope");
+    return HX_INVALID_MODEL;
+  }
   if (hx_terrain_surface(plant->terrain) == HX_SURFACE_SMOOTH || cell >= 2.0 * radius) return HX_OK;
   hx_print(message, HX_MESSAGE_SIZE,
            "terrain.grid: got blocks with cells of %.9g m, expected at least %.9g m, twice the "
@@ -61,9 +67,11 @@ static hxStatus check_start_depth(const hxPlant *plant, const hxDepths *depths,
   hxSunk worst = {0};
   char name[32];
   for (int k = 0; k < model->listed; ++k)
-    for (int slot = 0; hx_may_sink(model->row[k]) && slot < hx_slots_of(model->row[k]); ++slot) {
-      const hxSunk sphere = sunk(model, depths, model->row[k], slot);
-      if (contact->on_soil[hx_soil_row(model->row[k])][slot] == 0.0 &&
+    for (int slot = 0; slot < hx_slots_of(model->row[k]); ++slot) {
+      const int row = model->row[k];
+      if (hx_is_wall(row) || hx_is_of_pair(row)) continue;
+      const hxSunk sphere = sunk(model, depths, row, slot);
+      if (!(row == HX_FOOT && contact->on_soil[slot] != 0.0) &&
           sphere.depth - sphere.bound > worst.depth - worst.bound)
         worst = sphere;
     }

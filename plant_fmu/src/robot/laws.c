@@ -35,34 +35,12 @@ static void compile_friction(hxModel *model, const hxDefinition *d) {
   model->roll_friction = rubs && model->rolling_radius > 0.0;
 }
 
-static const double pi = 3.14159265358979323846;
-
-/* Sets the pads as which a corner of the torso's box sinks into soil on the box's sides along x, y
- * and z: a disc of a quarter of the side, whose b of eq. 40 is the side's smaller edge; the sphere,
- * where that is not smaller. */
-static void set_corner_pads(hxModel *model, const hxDefinition *d) {
-  const double *half = d->body.torso_box, corner = d->body.corner_radius;
-  for (int side = 0; side < 3; ++side) {
-    const double a = half[side == 0 ? 1 : 0], b = half[side == 2 ? 1 : 2], square = a * b / pi;
-    const int shape = hx_soil_shape(HX_TORSO, side), is_pad = square > corner * corner;
-    model->pad_radius[shape] = is_pad ? sqrt(square) : 0.0;
-    model->breadth[shape] = is_pad ? 2.0 * fmin(a, b) : 0.0;
-  }
-}
-
 /* Computes the constants of the definition's soil; the terrain is known. */
 static void compile_soil(hxModel *model, const hxDefinition *d) {
-  const double corner = d->body.corner_radius;
-  const double radius[HX_SOIL_SHAPES] = {
-      d->foot_radius, d->body.knee_radius, d->body.shank_radius, corner, corner, corner};
-  model->pad_radius[0] = d->foot_pad_radius;
-  set_corner_pads(model, d);
-  for (int shape = 0; shape < HX_SOIL_SHAPES; ++shape) {
-    const hxSoilShape is = {radius[shape], model->pad_radius[shape], model->breadth[shape]};
-    hxSoil soil;
-    hx_soil_compile(&d->soil, &is, &soil);
-    memcpy(model->soil[shape], &soil, sizeof soil);
-  }
+  hxSoil soil;
+  model->pad_radius = d->foot_pad_radius;
+  hx_soil_compile(&d->soil, d->foot_radius, d->foot_pad_radius, &soil);
+  memcpy(model->soil, &soil, sizeof soil);
   const double on_grid = model->terrain ? hx_terrain_shear_displacement(model->terrain) : 0.0;
   model->has_soil = d->soil.law != HX_SOIL_NONE || on_grid > 0.0;
   model->bristle_length = d->friction.presliding;

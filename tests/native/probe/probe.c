@@ -61,12 +61,11 @@ HX_API void hx_probe_power(const double *x, const double *y, double *power, doub
  * base and tan phi; row NULL: from the definition. */
 HX_API void hx_probe_soil(const hxSoilDefinition *definition, const double *row, double radius,
                           double pad, double plastic, double z, double dz, double out[10]) {
-  const hxSoilShape shape = {radius, pad, 0.0};
   hxSoil soil;
   if (row)
-    hx_soil_from_row(row, &shape, &soil);
+    hx_soil_from_row(row, radius, pad, &soil);
   else
-    hx_soil_compile(definition, &shape, &soil);
+    hx_soil_compile(definition, radius, pad, &soil);
   hxReal numbers[HX_SOIL_SIZE];
   hxSoils soils;
   for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_splat(((const double *)&soil)[i]);
@@ -98,11 +97,11 @@ HX_API void hx_probe_footprints(double depth[3][4]) {
   for (int k = 0; k < 1500; ++k)
     hx_footprints_add(&log, &(hxFootprint){k, 0.0, 1e-3 * (k + 1), 0.4});
   hx_footprints_begin(&log);
-  for (int i = 0; i < 4; ++i) depth[0][i] = hx_footprints_depth(&log.kept, NULL, place[i], 0.0);
+  for (int i = 0; i < 4; ++i) depth[0][i] = hx_footprints_depth(&log.kept, place[i], 0.0);
   for (int k = 0; k < 100; ++k) hx_footprints_add(&log, &(hxFootprint){k, 0.0, 2.0, 0.4});
-  for (int i = 0; i < 4; ++i) depth[1][i] = hx_footprints_depth(&log.kept, NULL, place[i], 0.0);
+  for (int i = 0; i < 4; ++i) depth[1][i] = hx_footprints_depth(&log.kept, place[i], 0.0);
   hx_footprints_take_back(&log);
-  for (int i = 0; i < 4; ++i) depth[2][i] = hx_footprints_depth(&log.kept, NULL, place[i], 0.0);
+  for (int i = 0; i < 4; ++i) depth[2][i] = hx_footprints_depth(&log.kept, place[i], 0.0);
 }
 
 HX_API double hx_probe_atan2(double y, double x) { return hx_atan2(y, x); }

@@ -1,8 +1,7 @@
 import uPlot from "uplot";
 import type { Clock } from "../clock";
-import { element } from "../dom";
+import { element, fixed } from "../dom";
 import { property, quietAxis } from "../theme";
-import { fixed, type Labelled, makeFigure } from "./heading";
 
 /** The interval of time that a group of plots shows; it moves on with the replay, page by page. */
 export class Span {
@@ -44,7 +43,12 @@ export class Span {
 
 const LEAST = 1e-4; // relative: a curve with a smaller range is a constant with round-off
 
-export interface Curve extends Labelled {
+/** A curve, and what its plot's heading shows of it. */
+export interface Curve {
+  readonly label: string;
+  /** Name of the page's custom property that holds the colour. */
+  readonly colour: string;
+  readonly dash?: readonly number[];
   readonly time: ArrayLike<number>;
   readonly values: ArrayLike<number>;
   /** Returns the value at a time, for the heading. */
@@ -149,6 +153,34 @@ export class Panel {
       if (over.hasPointerCapture(event.pointerId)) this.clock.seek(timeOf(event));
     });
   }
+}
+
+/** Adds a plot's figure to a host: its heading, the elements of its curves' values, and its box. */
+function makeFigure(
+  host: HTMLElement,
+  name: string,
+  unit: string,
+  curves: readonly Curve[],
+): { values: HTMLElement[]; box: HTMLElement } {
+  const figure = element("figure", "panel");
+  const heading = element("figcaption", "panel-title");
+  const title = element("span", "panel-name", name);
+  title.append(element("span", "panel-unit", ` ${unit}`));
+  const readouts = element("div", "readouts"); // which wrap into a row of their own together
+  const values = curves.map(({ label, colour, dash }) => {
+    const item = element("span", "readout");
+    const mark = element("i", dash ? "mark dashed" : "mark");
+    mark.style.setProperty("--mark", `var(${colour})`);
+    const value = element("b", "value");
+    item.append(mark, element("span", "curve-name", label), value);
+    readouts.append(item);
+    return value;
+  });
+  const box = element("div", "panel-box");
+  heading.append(title, readouts);
+  figure.append(heading, box);
+  host.append(figure);
+  return { values, box };
 }
 
 function seriesOf(curve: Curve): uPlot.Series {

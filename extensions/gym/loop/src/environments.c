@@ -1,4 +1,4 @@
-/* environments.c - many environments over threads. */
+/* environments.c - many environments. */
 #include "hexapod/environments.h"
 
 #include <math.h>
@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "environment.h"
-#include "pool.h"
 
 struct hxEnvironments {
   hxEnvSettings settings;
@@ -15,10 +14,6 @@ struct hxEnvironments {
   size_t count, size; /* environments, values in an observation */
   hxEnvironment *environment;
   double *drawn;
-  hxPool pool;
-  hxEnvWork work;       /* of the thread that calls reset or step */
-  const uint8_t *mask;  /* of the present reset */
-  const uint64_t *seed; /* of the present reset */
 };
 
 /* ----------------------------------------------------------------------------------------------
@@ -31,7 +26,6 @@ size_t hx_environments_settings_size(void) { return sizeof(hxEnvSettings); }
 static void free_memory(hxEnvironments *all) {
   free(all->environment);
   free(all->drawn);
-  free(all->work.block);
   free(all);
 }
 
@@ -53,8 +47,6 @@ hxEnvironments *hx_environments_create(const hxEnvSettings *settings, const hxEn
   all->settings = *settings;
   all->arrays = *arrays;
   all->size = hx_environments_observed(settings);
-  all->work = hx_environment_work(settings);
-  hx_pool_open(&all->pool);
   for (; all->count < n; ++all->count) {
     hxEnvironment *environment = &all->environment[all->count];
     double *drawn = all->drawn + all->count * settings->draws.count;
@@ -69,7 +61,6 @@ hxEnvironments *hx_environments_create(const hxEnvSettings *settings, const hxEn
 void hx_environments_destroy(hxEnvironments *all) {
   if (!all) return;
   for (size_t i = 0; i < all->count; ++i) hx_environment_close(&all->environment[i]);
-  hx_pool_close(&all->pool);
   free_memory(all);
 }
 
@@ -95,11 +86,10 @@ static void begin_next_episode(const hxEnvironments *all, size_t i) {
   hx_environment_observe(environment, observation_of(all, i));
 }
 
-static void reset_one(const hxEnvironments *all, size_t i) {
+static void reset_one(const hxEnvironments *all, size_t i, const uint64_t *seed) {
   hxEnvironment *environment = &all->environment[i];
-  if (all->mask && !all->mask[i]) return;
-  if (all->seed) {
-    environment->seed = all->seed[i];
+  if (seed) {
+    environment->seed = seed[i];
     environment->episode = 0;
     hx_environment_reset(environment);
     hx_environment_observe(environment, observation_of(all, i));
@@ -153,38 +143,29 @@ static void step_one(const hxEnvironments *all, size_t i) {
 }
 
 /* ----------------------------------------------------------------------------------------------
- * work on all */
+ * work on a share of them, whose plants use one work space by turns */
 
-/* Does something with an environment whose plant uses the work space of this thread meanwhile. */
-static void with_work(hxEnvironments *all, size_t i, const hxEnvWork *work,
-                      void (*act)(const hxEnvironments *all, size_t i)) {
-  hxEnvironment *environment = &all->environment[i];
-  hx_environment_use(environment, work);
-  act(all, i);
-  hx_environment_use(environment, NULL);
-}
-
-static void reset_item(void *owner, size_t i, void *own) { with_work(owner, i, own, reset_one); }
-
-static void step_item(void *owner, size_t i, void *own) { with_work(owner, i, own, step_one); }
-
-void hx_environments_reset(hxEnvironments *all, const uint8_t *mask, const uint64_t *seed) {
-  all->mask = mask;
-  all->seed = seed;
-  hx_pool_run(&all->pool, reset_item, all, all->count, &all->work);
-}
-
-void hx_environments_step(hxEnvironments *all) {
-  hx_pool_run(&all->pool, step_item, all, all->count, &all->work);
-}
-
-void hx_environments_serve(hxEnvironments *all) {
-  hxEnvWork work = hx_environment_work(&all->settings);
-  hx_pool_serve(&all->pool, &work);
+void hx_environments_reset(hxEnvironments *all, size_t first, size_t end, const uint8_t *mask,
+                           const uint64_t *seed) {
+  const hxEnvWork work = hx_environment_work(&all->settings);
+  for (size_t i = first; i < end; ++i) {
+    if (mask && !mask[i]) continue;
+    hx_environment_use(&all->environment[i], &work);
+    reset_one(all, i, seed);
+    hx_environment_use(&all->environment[i], NULL);
+  }
   free(work.block);
 }
 
-void hx_environments_stop(hxEnvironments *all) { hx_pool_stop(&all->pool); }
+void hx_environments_step(hxEnvironments *all, size_t first, size_t end) {
+  const hxEnvWork work = hx_environment_work(&all->settings);
+  for (size_t i = first; i < end; ++i) {
+    hx_environment_use(&all->environment[i], &work);
+    step_one(all, i);
+    hx_environment_use(&all->environment[i], NULL);
+  }
+  free(work.block);
+}
 
 /* ----------------------------------------------------------------------------------------------
  * inspection */

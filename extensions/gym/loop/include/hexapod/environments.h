@@ -5,12 +5,11 @@
  * Environments share nothing: what one does depends on its seed, its episode and its actions alone,
  * so that results are the same bits for any number of threads, any batch and any order.
  *
- * An FMU whose binary has the functions of shared_work.h uses the work space of the thread that
- * steps it, from just before to just after the step. The memory belongs to the library: that of the
- * thread that calls reset or step to the environments, that of a serving thread to its call.
+ * An FMU whose binary has the functions of shared_work.h uses a work space of the call of reset or
+ * step, from just before to just after its own step.
  *
- * The library creates no threads. A caller that wants n threads lets n - 1 threads of its own call
- * hx_environments_serve, which work whenever a call of reset or step runs.
+ * The library creates no threads. Several threads of a caller may each reset or step a share of the
+ * environments, from `first` to before `end`.
  *
  * SI units, frames and orders as in hexapod.h.
  */
@@ -179,21 +178,16 @@ HX_API size_t hx_environments_observed(const hxEnvSettings *settings);
 HX_API hxEnvironments *hx_environments_create(const hxEnvSettings *settings,
                                               const hxEnvArrays *arrays, size_t n, char *message);
 
-/* All calls of serve must have returned. */
 HX_API void hx_environments_destroy(hxEnvironments *environments);
 
-/* Starts an episode in the environments of the mask ([n], NULL: all). seed: [n] restarts the
- * episodes of these environments from these seeds; NULL: their next episodes. Environments whose
- * FMU refuses to start have the reason HX_END_FAILED. */
-HX_API void hx_environments_reset(hxEnvironments *environments, const uint8_t *mask,
-                                  const uint64_t *seed);
+/* Starts an episode in the environments of a share that are in the mask ([n], NULL: all). seed: [n]
+ * restarts the episodes of these environments from these seeds; NULL: their next episodes.
+ * Environments whose FMU refuses to start have the reason HX_END_FAILED. */
+HX_API void hx_environments_reset(hxEnvironments *environments, size_t first, size_t end,
+                                  const uint8_t *mask, const uint64_t *seed);
 
-/* Steps all environments. */
-HX_API void hx_environments_step(hxEnvironments *environments);
-
-/* Works for calls of reset and step in other threads, until hx_environments_stop. */
-HX_API void hx_environments_serve(hxEnvironments *environments);
-HX_API void hx_environments_stop(hxEnvironments *environments);
+/* Steps the environments of a share. */
+HX_API void hx_environments_step(hxEnvironments *environments, size_t first, size_t end);
 
 /* Returns the last message of an environment's FMUs, "" before any. */
 HX_API const char *hx_environments_message(const hxEnvironments *environments, size_t index);
