@@ -184,7 +184,8 @@ class Servo:
     @property
     def drag(self) -> float:
         """Torque that the joint's speed takes from a command [N m s/rad]: back-EMF (eq. 48) of a
-        motor, and viscous friction (eq. 49)."""
+        motor, and viscous friction (eq. 49).
+        """
         motor = self.drive == "motor"
         back_emf = self.torque_constant**2 / self.resistance if motor else 0.0
         return back_emf + self.viscous_friction
