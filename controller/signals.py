@@ -60,5 +60,5 @@ class Diagnostics:
     unreachable: Mask = field(default_factory=_flags)  # the joints could not follow
     fallback: Mask = field(default_factory=_flags)  # walks without feedback
     absent: Mask = field(default_factory=_flags)  # out of service: the others walk without it
-    # (3, 6) joints and legs: servos that do not do what they are told
+    # (3, 6) joints and legs: servos that do not follow their commands
     faulty: Mask = field(default_factory=lambda: np.zeros((3, LEGS), dtype=np.bool_))

@@ -62,7 +62,7 @@ def bundle() -> None:
         return
     install_packages(all_of_them=False)
     ENTRY.parent.mkdir(parents=True, exist_ok=True)
-    mains = [VIEWER / "src" / "main.ts", *sorted(ROOT.glob("extensions/*/viewer/main.ts"))]
+    mains = [VIEWER / "src" / "report.ts", *sorted(ROOT.glob("extensions/*/viewer/main.ts"))]
     ENTRY.write_text("".join(f'import "{path.as_posix()}";\n' for path in mains))
     run_script("bundle", str(ENTRY), f"--outfile={BUNDLE}", f"--metafile={METAFILE}")
     add_licences(BUNDLE)

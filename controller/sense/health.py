@@ -1,4 +1,4 @@
-"""Finds servos that do not do what they are told, and when they do again (C57). C: health.h.
+"""Finds servos that do not follow their commands, and when they do again (C57). C: health.h.
 
 The model of a servo says which torque it gives at its measured angle. The foot's measured force and
 the levers of the leg say which torque its joint needs. What is left, the unexplained torque, is

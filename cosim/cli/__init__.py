@@ -21,11 +21,6 @@ from hexapod_cosim.cosim.cli.failures import (
 )
 from hexapod_cosim.cosim.cli.terminal import json_alone
 
-NO_MEMORY = (
-    "the memory is full; give a smaller file or fewer rows, or run `hexapod --debug ...` to see "
-    "where"
-)
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command line and returns the exit code."""
@@ -35,45 +30,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         code = INTERRUPT
     except Exception as error:
-        if _is_interrupt(error):
-            return report_failure("interrupted", INTERRUPT, as_json=_wants_json(given))
         if "--debug" in given:
             raise
-        if isinstance(error, MemoryError):
-            return report_failure(NO_MEMORY, FAILURE, as_json=_wants_json(given))
-        if isinstance(error, OSError):
-            return report_failure(_refused_by_system(error), FAILURE, as_json=_wants_json(given))
-        text = f"unexpected {type(error).__name__}: {error}; run `hexapod --debug ...` to see where"
-        return report_failure(text, FAILURE, as_json=_wants_json(given))
+        return report_failure(_explained(error), FAILURE, as_json=_wants_json(given))
     if code == INTERRUPT:
         return report_failure("interrupted", INTERRUPT, as_json=_wants_json(given))
     return code
 
 
-def _is_interrupt(error: BaseException) -> bool:
-    """Returns whether Ctrl-C led to the error: some C extensions turn it into errors of their own
-    while they are imported.
-    """
-    inner: BaseException | None = error
-    seen = set[int]()
-    while inner is not None and id(inner) not in seen:
-        if isinstance(inner, KeyboardInterrupt):
-            return True
-        seen.add(id(inner))
-        inner = inner.__cause__ or inner.__context__
-    return False
-
-
-def _refused_by_system(error: OSError) -> str:
-    """Returns the message for a file, disk or process that the system refused."""
+def _explained(error: Exception) -> str:
+    """Returns the message for an error that is none of ours, such as one of the system."""
     from hexapod_cosim.models.errors import shortened
 
-    where = f"{shortened(str(error.filename))}: " if error.filename else ""
-    got = shortened(repr(error.strerror or str(error)))
-    return (
-        f"{where}the system refused an operation: got {got}; check the place, its rights and the "
-        "room on the disk, or run `hexapod --debug ...` to see where"
-    )
+    kind = "" if isinstance(error, OSError) else f"unexpected {type(error).__name__}: "
+    return f"{kind}{shortened(str(error))}; run `hexapod --debug ...` to see where"
 
 
 def _wants_json(given: Sequence[str]) -> bool:

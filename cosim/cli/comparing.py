@@ -11,14 +11,13 @@ from typing import Any
 
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
+    DRAWING,
     RunOptions,
     Words,
     check_accuracy,
     chosen_controls,
     default_folder,
-    drawing,
     run_into,
-    show_accuracy,
     show_rows,
     titled,
 )
@@ -27,14 +26,20 @@ from hexapod_cosim.cosim.cli.terminal import (
     show_files,
     show_json,
     show_text,
+    waiting,
     warn,
 )
 from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.report.figures import draw_figures
-from hexapod_cosim.cosim.report.tables import about, comparison_rows, with_errors
+from hexapod_cosim.cosim.report.tables import (
+    about,
+    about_accuracy,
+    comparison_rows,
+    with_errors,
+)
 from hexapod_cosim.cosim.report.writing import write_report
-from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
+from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.facts import Result, gait_differences
 from hexapod_cosim.cosim.results.folder import (
     ACCURACY,
@@ -112,8 +117,6 @@ class Work:
 
     def check(self) -> None:
         """Designs the gains of all runs, or raises errors before anything is run."""
-        if self.accuracy:
-            halved_scenario(self.plan)
         for control in self.compared:
             chosen_gains(replace(self.plan, control=control.text), self.options.gains)
 
@@ -182,11 +185,11 @@ def run_work(work: Work, path: Path) -> Done:
             )
             checked: dict[str, Accuracy] = {}
             if work.accuracy:
-                checked = _accuracies(work, comparison, folder.path)
+                checked = _accuracies(work, comparison)
                 write_json(folder.path / METRICS_FILE, _table(comparison, checked))
             if figures is None:
                 return Done(results, comparison, checked, files, None)
-            with drawing(folder.path):
+            with waiting(DRAWING):
                 files += write_report(
                     stored,
                     folder.path,
@@ -208,7 +211,8 @@ def _show(done: Done, walks: Sequence[str]) -> None:
     rows = comparison_rows(comparison, net_slip=net_slip)
     compared = [pair.title for pair in comparison.pairs]
     show_rows(with_errors(rows, checked), comparison.labels, compared)
-    show_accuracy(rows, checked, comparison.means)
+    if checked:
+        show_text(about_accuracy(checked))
     for text in walks:
         show_text(text)
     show_files(done.files)
@@ -286,13 +290,13 @@ def _all_seeds(work: Work, results: Mapping[str, Result], folder: Path) -> Compa
     return comparison
 
 
-def _accuracies(work: Work, comparison: Comparisons, folder: Path) -> dict[str, Accuracy]:
+def _accuracies(work: Work, comparison: Comparisons) -> dict[str, Accuracy]:
     """Returns the accuracies, by control, of the means over the compared seeds."""
     found = {}
     for control in work.compared:
         runs = comparison.judged[control.label]
         plans = [replace(work.plan, control=control.text, seed=run.seed) for run in runs]
-        found[control.label] = check_accuracy(plans, runs, folder, work.options)
+        found[control.label] = check_accuracy(plans, runs, work.options)
     return found
 
 

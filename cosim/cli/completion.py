@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import fields
 
 Offers = list[tuple[str, str]]  # word, meaning
 Complete = Callable[[str], Offers]
@@ -56,13 +55,6 @@ def _robots() -> Iterator[tuple[str, str]]:
         yield name, ""
 
 
-def _gaits() -> Iterator[tuple[str, str]]:
-    from hexapod_cosim.controller import PATTERNS
-
-    for name, pattern in PATTERNS.items():
-        yield name, f"duty factor {pattern.duty:.3g}"
-
-
 def _controls() -> Iterator[tuple[str, str]]:
     from hexapod_cosim.cosim.scenario.records import CONTROLS
 
@@ -70,17 +62,8 @@ def _controls() -> Iterator[tuple[str, str]]:
         yield name, ""
 
 
-def _requirements() -> Iterator[tuple[str, str]]:
-    from hexapod_cosim.controller import Requirements
-
-    for item in fields(Requirements):
-        yield f"{item.name}=", ""
-
-
 scenario = _offering(_scenarios)
 setting = _offering(_settings)
 surface = _offering(_surfaces)
 robot = _offering(_robots)
-gait = _offering(_gaits)
 control = _offering(_controls)
-requirement = _offering(_requirements)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hexapod_cosim.controller import DEFAULT_PERIOD
-from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.options import Json, RobotName
 
 if TYPE_CHECKING:
@@ -25,7 +24,6 @@ RequirementSettings = Annotated[
         "--set",
         metavar="REQUIREMENT=VALUE",
         help="Ask for something else (phase_margin=50).",
-        autocompletion=completion.requirement,
     ),
 ]
 DesignFolder = Annotated[

@@ -76,7 +76,6 @@ GaitName = Annotated[
     typer.Option(
         "--gait",
         help="Of the controller: one of `hexapod list gaits`.",
-        autocompletion=completion.gait,
     ),
 ]
 StanceName = Annotated[

@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import typer
 
-from hexapod_cosim.controller import Gait
-from hexapod_cosim.cosim.cli.running import given_gains
+from hexapod_cosim.controller import Gait, load_gains
 from hexapod_cosim.cosim.cli.terminal import refuse_unused, show_files, show_json, waiting, warn
 from hexapod_cosim.cosim.cli.terrains import surfaces_from
 from hexapod_cosim.cosim.common.files import write_text, writing_into
 from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.export.robot_package import export_package, read_values
 from hexapod_cosim.cosim.interface.controller import ControllerSetup
-from hexapod_cosim.cosim.run.gait_selection import compliant_gait
-from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.cosim.scenario.records import CHOSEN, OWN
 from hexapod_cosim.models import HexapodError, Robot, load_robot, unknown_name
 from hexapod_cosim.models.mjcf import robot_to_mjcf
-from hexapod_cosim.models.records import Servo
-from hexapod_cosim.models.servos.motor import has_measured_friction
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
 
@@ -30,15 +25,13 @@ from hexapod_cosim.models.urdf.writer import robot_to_urdf
 class Format:
     """A file format of robots."""
 
-    name: str
-    title: str
     suffix: str
     write: Callable[[Robot], str]
 
 
 FORMATS = {
-    "urdf": Format("urdf", "a URDF", ".urdf", robot_to_urdf),
-    "mjcf": Format("mjcf", "an MJCF file", ".xml", robot_to_mjcf),
+    "urdf": Format(".urdf", robot_to_urdf),
+    "mjcf": Format(".xml", robot_to_mjcf),
 }
 DEFAULT_CONTROL = "compliant"  # of a package
 SUFFIXES = {**{name: form.suffix for name, form in FORMATS.items()}, "ssp": ".ssp"}
@@ -147,6 +140,8 @@ def _in_stance(robot: Robot, stance: str) -> tuple[Robot, Gait | None]:
         raise unknown_name("stance", stance, (OWN, CHOSEN))
     if stance == OWN:
         return robot, None
+    from hexapod_cosim.cosim.run.gait_selection import compliant_gait
+
     with waiting("choosing the stance"):
         walk = compliant_gait(robot)
     return walk.robot, walk.gait
@@ -154,13 +149,7 @@ def _in_stance(robot: Robot, stance: str) -> tuple[Robot, Gait | None]:
 
 def _export_description(robot: Robot, output: Path | None, form: Format) -> Path:
     """Writes a robot's URDF or MJCF file and returns its path."""
-    path = export_description(robot, _path(output, robot.name, form.suffix), form)
-    lost = left_out(robot.servo, form)
-    if lost:
-        warn(
-            f"{path.name}: {form.title} cannot say and leaves out of the servos: {', '.join(lost)}"
-        )
-    return path
+    return export_description(robot, _path(output, robot.name, form.suffix), form)
 
 
 def _export_plant(robot: Robot, request: Request) -> Path:
@@ -216,7 +205,9 @@ def _controller_setup(
     robot: Robot, request: Request, control: str, gait: Gait | None
 ) -> ControllerSetup:
     """Builds the controller's setup; shows a warning for gains of another robot or period."""
-    gains = given_gains(request.gains)
+    from hexapod_cosim.cosim.run.plan import make_setup
+
+    gains = None if request.gains is None else load_gains(request.gains)
     designs = control != "kinematic" and gains is None
     with waiting("designing the gains" if designs else None):
         setup = make_setup(
@@ -225,21 +216,6 @@ def _controller_setup(
     for warning in setup.build().warnings:
         warn(warning)
     return setup
-
-
-def left_out(servo: Servo, form: Format) -> list[str]:
-    """Returns what a format cannot say of the servos, and a robot's file can."""
-    viscous = form.name == "mjcf"  # which has it as the joint's damping
-    load = replace(servo, viscous_friction=0.0) if viscous else servo
-    facts = {
-        "friction that depends on load and speed": has_measured_friction(load),
-        "the limits of the motor's voltage": servo.drive == "motor",
-        "heat": servo.drive == "motor" and servo.winding_capacity > 0.0,
-        "the supply's resistance": servo.drive == "motor" and servo.supply_resistance > 0.0,
-        "the bus and the steps of commands": servo.bus_period > 0.0 or servo.command_step > 0.0,
-        "the rotors' angular momentum": servo.gear_ratio != 0.0,
-    }
-    return [name for name, present in facts.items() if present]
 
 
 def export_description(robot: Robot, path: str | Path, form: Format) -> Path:

@@ -96,7 +96,6 @@ CheckAccuracy = Annotated[
     bool,
     typer.Option(
         "--check-accuracy",
-        help="Walk again at a hundredth of the solver's tolerance, and again with half the "
-        "macro-step: an error beside every metric.",
+        help="Walk again at a hundredth of the solver's tolerance: an error beside every metric.",
     ),
 ]

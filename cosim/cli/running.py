@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -13,27 +13,22 @@ from typing import Any
 from hexapod_cosim.controller import Gains, load_gains
 from hexapod_cosim.cosim.cli.options import ENGINES
 from hexapod_cosim.cosim.cli.terminal import (
-    Count,
     counting_bar,
     progress_bar,
     show_table,
-    show_text,
     waiting,
     warn,
 )
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
-from hexapod_cosim.cosim.report.tables import Metrics, Rows, about_accuracy, effect_rows
 from hexapod_cosim.cosim.results.accuracy import (
     Accuracy,
     compare_accuracy,
-    halved_scenario,
     reference_scenario,
 )
 from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.folder import ResultsFolder, write_result
-from hexapod_cosim.cosim.results.metric_table import OF_THE_RUN
 from hexapod_cosim.cosim.results.recordings import check_formats
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch
@@ -43,6 +38,7 @@ from hexapod_cosim.cosim.scenario.controls import Control, control_of, parse_con
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, unknown_name
 
+DRAWING = "drawing figures and report"
 UNTITLED = (
     "control=",
     "control.",
@@ -160,20 +156,6 @@ def run_into(
     return result, files
 
 
-@contextmanager
-def drawing(folder: Path) -> Iterator[None]:
-    """Shows on a terminal that figures are drawn; after an interrupt, warns of what is missing."""
-    try:
-        with waiting("drawing figures and report"):
-            yield
-    except KeyboardInterrupt:
-        warn(
-            f"the results in {folder} are complete, the figures are not: "
-            f"`hexapod report {folder}` draws them"
-        )
-        raise
-
-
 def given_gains(path: Path | None) -> Gains | None:
     """Reads the gains of a file, if one is given. Raises GainsError."""
     return None if path is None else load_gains(path)
@@ -184,26 +166,13 @@ def default_folder(scenario: str) -> Path:
     return Path("out") / Path(scenario).stem
 
 
-def _has_value(row: Mapping[str, Any]) -> bool:
-    """Returns whether some control has a number in a row of a report's table."""
-    return any(text not in ("", "-") for text in row["values"])
-
-
 def show_rows(
     rows: Sequence[Mapping[str, Any]], controls: Sequence[str], compared: Sequence[str] = ()
 ) -> None:
     """Prints the rows of a report's table without its empty columns.
 
     compared: the headings of the changes.
-    Where no control has a metric of its walk, a sentence takes the place of the empty rows.
     """
-    walks = [row for row in rows if row["name"] not in ("walked", *OF_THE_RUN)]
-    if walks and not any(_has_value(row) for row in walks):
-        rows = [row for row in rows if row not in walks]
-        show_text(
-            f"No run is long enough for the {len(walks)} metrics of a walk, or none ended upright: "
-            "the warnings say which, and what to change."
-        )
     columns = {"metric": [row["name"] for row in rows], "unit": [row["unit"] for row in rows]}
     columns |= {control: [row["values"][k] for row in rows] for k, control in enumerate(controls)}
     for k, title in enumerate(compared):
@@ -230,7 +199,6 @@ def chosen_controls(texts: Sequence[str], plan: Scenario) -> tuple[Control, ...]
 def check_accuracy(
     plans: Sequence[Scenario],
     runs: Sequence[Summary],
-    folder: Path,
     options: RunOptions,
 ) -> Accuracy:
     """Returns the accuracy of runs of one control, whose results are in a folder already.
@@ -238,49 +206,17 @@ def check_accuracy(
     Args:
         plans: the scenarios of the runs.
         runs: their summaries.
-        folder: where their results are, for the message after an interrupt.
-        options: those of the runs. Gains that are not given are designed for each macro-step.
+        options: those of the runs.
     """
     fine = [reference_scenario(plan) for plan in plans]
-    half = [halved_scenario(plan) for plan in plans]
-    try:
-        with counting_bar("accuracy", len(fine) + len(half)) as report_count:
-            references = list(_run(fine, options, report_count, done=0))
-            halves = list(_run(half, options, report_count, done=len(fine)))
-    except KeyboardInterrupt:
-        warn(
-            f"the results in {folder} are complete, their accuracy was not checked; "
-            f"`hexapod report {folder}` draws their figures"
-        )
-        raise
-    found = compare_accuracy(plans[0], runs, references, halves)
+    compiled = options.engine == "compiled"
+    batch = run_batch(fine, fmu=options.fmu, gains=options.gains, compiled=compiled)
+    references: list[Summary] = []
+    with counting_bar("accuracy", len(fine)) as report_count, closing(batch) as done:
+        for summary in done:
+            references.append(summary)
+            report_count(len(references))
+    found = compare_accuracy(plans[0], runs, references)
     for text in found.notes:
         warn(f"accuracy: {text}")
     return found
-
-
-def _run(
-    plans: Sequence[Scenario], options: RunOptions, report_count: Count, *, done: int
-) -> Iterator[Summary]:
-    """Runs the plans; `done` is the number of runs before them."""
-    compiled = options.engine == "compiled"
-    runs = run_batch(plans, fmu=options.fmu, gains=options.gains, compiled=compiled)
-    with closing(runs) as batch:
-        report_count(done)
-        for count, summary in enumerate(batch, start=done + 1):
-            report_count(count)
-            yield summary
-
-
-def show_accuracy(rows: Rows, accuracies: Mapping[str, Accuracy], metrics: Metrics) -> None:
-    """Prints an explanation of the errors in the main table and the effects of half the macro-step.
-
-    rows: those of the main table; accuracies, metrics: by control.
-    """
-    if not accuracies:
-        return
-    show_text(about_accuracy(accuracies))
-    texts = [
-        [row["name"], row["unit"], *row["values"]] for row in effect_rows(rows, accuracies, metrics)
-    ]
-    show_table(["metric", "unit", *accuracies], texts, right=range(2, 2 + len(accuracies)))

@@ -21,7 +21,6 @@ class Component:
     structure: str  # in names of C structures: hx{structure}Definition
     suffix: str  # of the model's name, after the robot's
     description: str  # of the model, with the robot's {bodies} and {joints}
-    package: str = "hexapod_cosim.cosim.export"  # its folder pages has the page NAME.html.jinja
 
 
 PLANT = Component(

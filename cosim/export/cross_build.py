@@ -26,7 +26,6 @@ from hexapod_cosim.models.errors import FmuError, HexapodError
 PACKAGE = "ziglang"
 APPLICATION = "hexapod-cosim"
 SHOWN_LINES = 12  # of the compiler's messages
-TIMEOUT = 1200  # s    builds for Windows were seen to hang
 
 # as in plant_fmu/CMakeLists.txt, which gives the reasons
 COMPILE = (
@@ -185,27 +184,16 @@ def _compile(library: Library, command: Sequence[str], target: Target, cache_fol
 
 
 def _run(command: Sequence[str], root: Path, target: Target, cache_folder: Path) -> None:
-    """Runs the compiler. Raises FmuError when it fails or exceeds TIMEOUT."""
-    environment = compiler_environment(root, cache_folder)
-    try:
-        process = subprocess.run(
-            command,
-            cwd=root / "in",
-            env=environment,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            check=False,
-            timeout=TIMEOUT,
-        )
-    except subprocess.TimeoutExpired as error:
-        fix = "run it again: what is done so far is kept"
-        raise FmuError(
-            f"cannot build for {target.triple}",
-            got="a compiler that hangs",
-            expected=f"an end within {TIMEOUT} s",
-            fix=fix,
-        ) from error
+    """Runs the compiler. Raises FmuError when it fails."""
+    process = subprocess.run(
+        command,
+        cwd=root / "in",
+        env=compiler_environment(root, cache_folder),
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
+    )
     if process.returncode != 0:
         messages = (
             "\n".join(process.stderr.splitlines()[:SHOWN_LINES])

@@ -214,7 +214,8 @@ def _reference(interface: Interface, members: dict[str, bytes], fmi: int) -> dic
     if fmi != 2 or interface.component is not PLANT or not any(own in name for name in members):
         return {}
     with TemporaryFolder("export") as folder:
-        return reference_members(interface, write_archive(folder / "trial.fmu", members))
+        trial = write_archive(folder / "trial.fmu", members, ZIP_STORED)
+        return reference_members(interface, trial)
 
 
 def write_archive(
@@ -281,7 +282,7 @@ def extra_members(
 
 def pictures(interface: Interface, *, fmi: int = 2) -> dict[str, bytes]:
     """Returns the robot's picture and icon by path in the archive."""
-    from hexapod_cosim.cosim.export.picture import draw_robot  # noqa: PLC0415
+    from hexapod_cosim.cosim.export.documentation import draw_robot  # noqa: PLC0415
 
     sizes = {PICTURES[fmi]: PICTURE_SIZE, f"{FOLDER}/{ICON}": ICON_SIZE}
     return {

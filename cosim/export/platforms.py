@@ -8,9 +8,8 @@ binary that was installed with this package.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 
 from hexapod_cosim.cosim.common.binaries import join_mach_o
 from hexapod_cosim.cosim.common.components import PLANT, Component
@@ -100,21 +99,11 @@ def build_binaries(library: Library, platforms: Iterable[str], *, fmi: int) -> d
 def _compile(library: Library, targets: list[str]) -> dict[str, bytes]:
     """Builds a library for several targets in parallel."""
     compiler = find_compiler()
-    with _thread_pool(len(targets)) as pool:
+    with ThreadPoolExecutor(len(targets)) as pool:
         libraries = pool.map(
             lambda target: build_library(library, target, compiler=compiler), targets
         )
         return dict(zip(targets, libraries, strict=True))
-
-
-@contextmanager
-def _thread_pool(count: int) -> Iterator[ThreadPoolExecutor]:
-    """Yields a thread pool, whose waiting jobs are cancelled on an error or interrupt."""
-    pool = ThreadPoolExecutor(count)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def _member(library: Library, folder: str, targets: tuple[str, ...]) -> str:

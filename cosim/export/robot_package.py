@@ -20,7 +20,6 @@ from hexapod_cosim.cosim.interface.controller import (
     load_controller_interface,
 )
 from hexapod_cosim.cosim.interface.plant import load_interface
-from hexapod_cosim.cosim.scenario.records import GRAVITY_NAMES
 from hexapod_cosim.models import FmuError, HexapodError, unknown_name
 
 PLANT, CONTROLLER = "plant", "controller"  # in the order of calculation
@@ -96,18 +95,6 @@ def read_values(texts: Iterable[str]) -> dict[str, dict[str, float]]:
         component, _, variable = name.partition(".")
         if component not in {PLANT, CONTROLLER}:
             raise unknown_name("component", component, (PLANT, CONTROLLER), where=f"--set {text}")
-        if variable in GRAVITY_NAMES:
-            fix = (
-                "write gravity = [0, 0, -1.62] into the robot's file: gains and the standing "
-                "pose follow from it"
-            )
-            raise HexapodError(
-                "gravity of one component alone",
-                got=name,
-                expected="the same for both",
-                fix=fix,
-                where=f"--set {text}",
-            )
         try:
             found.setdefault(component, {})[variable] = float(number)
         except ValueError as error:

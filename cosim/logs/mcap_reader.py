@@ -1,9 +1,9 @@
 """Reads MCAP files: our recordings bit for bit, and the ROS 2 topics of robots.
 
-The topics are told apart by the type of their messages and by their names. A topic of joint states
-whose name contains "command" or "desired" holds commands, any other one measurements. The measured
-joint states give the times of the rows; commands hold until the next one, and readings of other
-sensors are interpolated linearly between their own times.
+The type of its messages and its name say what a topic has. A topic of joint states whose name
+contains "command" or "desired" has commands, any other one measurements. The measured joint states
+give the times of the rows; commands hold until the next one, and readings of other sensors are
+interpolated linearly between their own times.
 """
 
 from __future__ import annotations

@@ -19,8 +19,15 @@ from hexapod_cosim.cosim.common.binaries import refuse_incomplete
 from hexapod_cosim.cosim.common.plant_files import packed_binary
 from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
 from hexapod_cosim.cosim.interface.descriptions import read_description
-from hexapod_cosim.cosim.master.fmu_block import FmuBlock, FmuVariable, StepError, parameter_number
-from hexapod_cosim.cosim.master.fmu_log import STATUS, WARNING, FmuLog
+from hexapod_cosim.cosim.master.fmu_block import (
+    STATUS,
+    WARNING,
+    FmuBlock,
+    FmuLog,
+    FmuVariable,
+    StepError,
+    parameter_number,
+)
 from hexapod_cosim.models.errors import FmuError, nearest_name
 
 LAST_SUCCESSFUL_TIME = 2  # fmi2StatusKind

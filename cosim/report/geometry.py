@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.export.picture import COLOURS, THICKNESS
+from hexapod_cosim.cosim.export.documentation import COLOURS, THICKNESS
 from hexapod_cosim.cosim.interface.names import vector_names
-from hexapod_cosim.cosim.report.packing import pack
+from hexapod_cosim.cosim.report.columns import pack
 from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.support import FLAT, SLOPE
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot

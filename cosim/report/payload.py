@@ -7,14 +7,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from hexapod_cosim.cosim.common.control_style import control_styles
-from hexapod_cosim.cosim.report.columns import MOST_ROWS, Array, Columns, choose
+from hexapod_cosim.cosim.report.columns import MOST_ROWS, Array, Columns, choose, pack
 from hexapod_cosim.cosim.report.geometry import (
     describe_ground,
     describe_robot,
     pack_surface,
     stride,
 )
-from hexapod_cosim.cosim.report.packing import pack
 from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.window import CONTACT_SHARE
 from hexapod_cosim.models.ground.surface import Surface

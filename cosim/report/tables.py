@@ -12,7 +12,6 @@ from hexapod_cosim.cosim.results.metric_table import DUST, FLOORS, METRICS, show
 from hexapod_cosim.cosim.results.side_by_side import Comparisons
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
-SHOWN = 0.0005  # relative; a smaller effect would be shown as 0.0 %
 SIZE = (len(LEG_NAMES), len(JOINT_NAMES))
 
 Rows = list[dict[str, Any]]
@@ -139,44 +138,9 @@ def with_errors(rows: Rows, accuracies: Mapping[str, Accuracy]) -> Rows:
 
 
 def _with_error(name: str, text: str, accuracy: Accuracy) -> str:
-    error = accuracy.solver_error.get(name, math.nan)
-    return f"{text} ± {_short(name, abs(error))}" if math.isfinite(error) else text
-
-
-def effect_rows(rows: Rows, accuracies: Mapping[str, Accuracy], metrics: Metrics) -> Rows:
-    """Returns the effects of half the macro-step, in rows like those of a report's table.
-
-    metrics: the values by control, for relative effects.
-    """
-    return [
-        {
-            "name": (name := row["name"]),
-            "unit": row["unit"],
-            "values": [
-                _effect(name, item.macro_step_effect.get(name, math.nan), metrics[label].get(name))
-                for label, item in accuracies.items()
-            ],
-        }
-        for row in rows
-        if any(row["name"] in item.macro_step_effect for item in accuracies.values())
-    ]
-
-
-def _effect(name: str, effect: float, value: float | None) -> str:
-    """Returns an effect with its sign and, where the value allows, its share of the value."""
-    if not math.isfinite(effect):
-        return "-"
-    text = _short(name, effect)
-    sign = "" if text == "0" or effect < 0.0 else "+"
-    known = value is not None and abs(value) > FLOORS.get(name, 0.0)
-    share = effect / value if value is not None and known else 0.0
-    relative = f" ({100.0 * share:+.1f} %)" if abs(share) >= SHOWN else ""
-    return f"{sign}{text}{relative}"
-
-
-def _short(name: str, value: float) -> str:
-    """Returns a value with two digits, or 0 where it is below the metric's round-off."""
-    return "0" if abs(value) < DUST * FLOORS.get(name, 0.0) or value == 0.0 else f"{value:.2g}"
+    error = abs(accuracy.solver_error.get(name, math.nan))
+    dust = DUST * FLOORS.get(name, 0.0)
+    return f"{text} ± {0.0 if error < dust else error:.2g}" if math.isfinite(error) else text
 
 
 def about_accuracy(accuracies: Mapping[str, Accuracy]) -> str:
@@ -192,7 +156,5 @@ def about_accuracy(accuracies: Mapping[str, Accuracy]) -> str:
     )
     return (
         "± is the solver's error: by so much a value differs from that of the same walk at "
-        f"{first.reference}, with the same commands and control period.{means} "
-        f"Half the macro-step, {first.macro_step:g} s, in which the controller acts and outputs "
-        "are read twice as often, changes:"
+        f"{first.reference}, with the same commands and control period.{means}"
     )

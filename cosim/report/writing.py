@@ -19,12 +19,10 @@ from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, pla
 from hexapod_cosim.cosim.report.page import NO_VIEWER, embedded, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json, make_payload
 from hexapod_cosim.cosim.report.tables import (
-    Metrics,
     Rows,
     about,
     about_accuracy,
     comparison_rows,
-    effect_rows,
     metric_rows,
     with_errors,
 )
@@ -140,7 +138,7 @@ def write_report(
         scenario=first.scenario if scenario is None else scenario,
         command=first.facts.command if command is None else command,
         differences=walks,
-        **content | _accuracy(content["rows"], accuracies, content["metrics"]),
+        **content | _accuracy(content["rows"], accuracies),
         **_facts(runs),
         **_ground(runs),
         **_replay(runs),
@@ -186,11 +184,10 @@ def _ground(runs: Mapping[str, StoredResult]) -> dict[str, Any]:
     }
 
 
-def _accuracy(rows: Rows, accuracies: Mapping[str, Accuracy], metrics: Metrics) -> dict[str, Any]:
+def _accuracy(rows: Rows, accuracies: Mapping[str, Accuracy]) -> dict[str, Any]:
     """Returns the parts of the page on accuracy, and the rows of the table with errors."""
     return {
         "accuracy": about_accuracy(accuracies),
-        "effects": effect_rows(rows, accuracies, metrics),
         "notes": [f"accuracy: {text}" for item in accuracies.values() for text in item.notes],
         "rows": with_errors(rows, accuracies),
     }
@@ -227,7 +224,6 @@ def _one_run(run: StoredResult) -> dict[str, Any]:
         "cards": [],
         "columns": list(metrics),
         "compared": [],
-        "metrics": metrics,
         "rows": rows,
         "about": "",
         "overall": [],
@@ -249,7 +245,6 @@ def _comparison(comparison: Comparisons, facts: RunFacts) -> dict[str, Any]:
         "cards": cards(main),
         "columns": comparison.labels,
         "compared": [pair.title for pair in comparison.pairs],
-        "metrics": comparison.means,
         "rows": rows,
         "about": notes,
         "overall": comparison.warnings if len(comparison.seeds) > 1 else comparison.losses,

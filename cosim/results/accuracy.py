@@ -1,16 +1,10 @@
-"""Estimates how exact a run's metrics are, from two more runs of the same walk.
+"""Estimates how exact a run's metrics are, from a more exact run of the same walk.
 
-- The solver error is the metric minus that of a reference run: the same scenario, seed, gains,
-  commands and control period with a solver tolerance FINER times smaller or, where the step is
-  fixed, a solver step FINER_STEP times smaller. It includes how the controller reacts to the
-  difference.
-- The effect of the macro-step is the metric with half the macro-step minus the run's own metric.
-  The controller then acts, and outputs are read, twice as often; gains that were designed for the
-  run are designed again for the shorter period, given gains stay. So this is no error of the run,
-  but shows how much its metrics depend on the chosen macro-step.
-
-The metrics in TIMED, which depend on the machine, are left out. Over several seeds both numbers are
-differences of means.
+The solver error is the metric minus that of a reference run: the same scenario, seed, gains,
+commands and control period with a solver tolerance FINER times smaller or, where the step is fixed,
+a solver step FINER_STEP times smaller. It includes how the controller reacts to the difference. The
+metrics in TIMED, which depend on the machine, are left out. Over several seeds it is a difference
+of means.
 """
 
 from __future__ import annotations
@@ -20,12 +14,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
-from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.summary import Summary, finite_mean
-from hexapod_cosim.cosim.scenario.checks import check_steps
 from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.models import ScenarioError
 
 FINER, FINER_STEP = 100.0, 10.0
 TIMED = ("realtime_factor",)  # metrics of wall time, which no solver makes more exact
@@ -37,19 +28,14 @@ class Accuracy:
     """Accuracy of one run's metrics, or of their means over several seeds; NaN where none."""
 
     reference: str  # the setting of the reference, NAME=VALUE
-    macro_step: float  # s    half of the run's
-    runs: int  # that are used: those in which all three walked; all runs where there are none
+    runs: int  # that are used: those in which both walked; all runs where there are none
     solver_error: Mapping[str, float]  # by metric, in its unit: run minus reference
-    macro_step_effect: Mapping[str, float]  # by metric: run with half the macro-step minus run
-    notes: tuple[str, ...]  # extra runs that ended differently from the run itself
+    notes: tuple[str, ...]  # references that ended differently from the run itself
 
     @property
     def about(self) -> str:
-        """A sentence on what the two numbers compare."""
-        return (
-            f"solver error: less the same walk at {self.reference}; "
-            f"half the macro-step: the same walk at macro_step={self.macro_step:g} less this one"
-        )
+        """A sentence on what the numbers compare."""
+        return f"solver error: less the same walk at {self.reference}"
 
     def as_table(self) -> dict[str, Any]:
         """Returns a table for JSON, which `accuracy_from_table` reads."""
@@ -59,13 +45,11 @@ class Accuracy:
 def accuracy_from_table(table: Any) -> Accuracy:
     """Reads a table that `as_table` returned. Raises KeyError or TypeError when it is damaged."""
     given = {item.name: table[item.name] for item in fields(Accuracy)}
-    for name in ("solver_error", "macro_step_effect"):
-        given[name] = _numbers(given[name])
-    return Accuracy(**{**given, "notes": tuple(given["notes"])})
-
-
-def _numbers(values: Mapping[str, float | None]) -> dict[str, float]:
-    return {name: math.nan if value is None else float(value) for name, value in values.items()}
+    errors = {
+        name: math.nan if value is None else float(value)
+        for name, value in given["solver_error"].items()
+    }
+    return Accuracy(**{**given, "solver_error": errors, "notes": tuple(given["notes"])})
 
 
 def reference_scenario(scenario: Scenario) -> Scenario:
@@ -86,49 +70,21 @@ def _finer_setting(scenario: Scenario) -> tuple[str, float]:
     return TOLERANCE, float(given.get(TOLERANCE, solver.tolerance)) / FINER
 
 
-def halved_scenario(scenario: Scenario) -> Scenario:
-    """Returns the scenario with half the macro-step.
-
-    Raises ScenarioError where that makes too many steps.
-    """
-    half = replace(scenario, macro_step=0.5 * scenario.macro_step)
-    try:
-        check_steps(half)
-    except ScenarioError as error:
-        raise ScenarioError(
-            "too long for --check-accuracy, which halves the macro-step",
-            got=error.got,
-            expected=error.expected,
-            fix=error.fix,
-            where=error.where,
-        ) from error
-    return half
-
-
 def compare_accuracy(
-    scenario: Scenario,
-    runs: Sequence[Summary],
-    references: Sequence[Summary],
-    halves: Sequence[Summary],
+    scenario: Scenario, runs: Sequence[Summary], references: Sequence[Summary]
 ) -> Accuracy:
-    """Returns the accuracy of runs from their reference runs and their runs with half macro-step.
+    """Returns the accuracy of runs from their reference runs.
 
     scenario: of the first run; the others may differ from it by their seed.
     """
     name, value = _finer_setting(scenario)
-    reference, half = f"{name}={value:g}", halved_scenario(scenario).macro_step
-    triples = list(zip(runs, references, halves, strict=True))
-    judged = [triple for triple in triples if all(run.walked for run in triple)] or triples
+    pairs = list(zip(runs, references, strict=True))
+    judged = [pair for pair in pairs if pair[0].walked and pair[1].walked] or pairs
     return Accuracy(
-        reference=reference,
-        macro_step=half,
+        reference=f"{name}={value:g}",
         runs=len(judged),
-        solver_error=_mean_differences([(run, other) for run, other, _ in judged]),
-        macro_step_effect=_mean_differences([(other, run) for run, _, other in judged]),
-        notes=(
-            *_notes(f"at {reference}", runs, references),
-            *_notes(f"at macro_step={half:g}", runs, halves),
-        ),
+        solver_error=_mean_differences(judged),
+        notes=tuple(_notes(f"at {name}={value:g}", pairs)),
     )
 
 
@@ -141,14 +97,11 @@ def _mean_differences(pairs: Sequence[tuple[Summary, Summary]]) -> dict[str, flo
     }
 
 
-def _notes(where: str, runs: Sequence[Summary], others: Sequence[Summary]) -> list[str]:
-    """Describes the extra runs that did not end as the runs did."""
-    found = []
-    for run, other in zip(runs, others, strict=True):
-        if other.walked == run.walked and other.status == run.status:
-            continue
-        how = other.reason or "it walked to the end"
-        if not other.reason and other.status == COMPLETED and not other.upright and other.warnings:
-            how = other.warnings[0]
-        found.append(f"{run.control}, seed {run.seed}, {where} ended differently: {how}")
-    return found
+def _notes(where: str, pairs: Sequence[tuple[Summary, Summary]]) -> list[str]:
+    """Describes the references that did not end as the runs did."""
+    return [
+        f"{run.control}, seed {run.seed}, {where} ended differently: "
+        f"{'it walked to the end' if other.walked else other.failure}"
+        for run, other in pairs
+        if (other.walked, other.status) != (run.walked, run.status)
+    ]

@@ -4,7 +4,6 @@ servos, legs that overlap and missing energy.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -14,7 +13,7 @@ from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.locomotion import fallback_columns
 from hexapod_cosim.cosim.results.summary import FIX, UNBALANCED
 from hexapod_cosim.cosim.results.support import ground_normal
-from hexapod_cosim.cosim.results.window import LEAST_DISTANCE, SKIPPED_CYCLES, View, friction_law
+from hexapod_cosim.cosim.results.window import SKIPPED_CYCLES, View, friction_law
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
 from hexapod_cosim.models import LEG_NAMES, Robot
 from hexapod_cosim.models.ground.surface import Surface
@@ -28,22 +27,13 @@ def fallback_warnings(recording: Recording) -> list[str]:
     fallen_back = fallback_columns(recording)
     if not fallen_back.any():
         return []
-    together = float(fallen_back.all(axis=1).mean())
-    legs = {
-        leg: float(share) - together
-        for leg, share in zip(LEG_NAMES, fallen_back.mean(axis=0), strict=True)
-    }
-    found = [
-        f"leg {leg} walked without feedback for {share:.0%} of the time: "
-        "its foot's sensor contradicted the plan"
-        for leg, share in legs.items()
-        if share
+    shares = zip(LEG_NAMES, fallen_back.mean(axis=0), strict=True)
+    found = [f"{leg} {share:.0%}" for leg, share in shares if share]
+    return [
+        f"legs walked without feedback for a share of the time ({', '.join(found)}): a foot's "
+        "sensor contradicted the plan, the robot slid, its joints could not follow, or too many "
+        "sensors failed"
     ]
-    slid = (
-        f"all legs walked without feedback for {together:.0%} of the time: "
-        "the robot slid, its joints could not follow, or too many sensors failed"
-    )
-    return [slid, *found] if together else found
 
 
 def friction_warnings(parameters: Mapping[str, float]) -> list[str]:
@@ -211,21 +201,6 @@ def short_run_warnings(view: View) -> list[str]:
         f"which is {cycles} whole gait cycles (metrics are of what comes after the first "
         f"{SKIPPED_CYCLES}, and a cycle takes {view.period:g} s); set duration={needed:.6g}"
     ]
-
-
-def missing_metrics_warnings(view: View) -> list[str]:
-    """Warns of metrics that a run of enough cycles lacks, with the reason."""
-    window, found = view.window, list[str]()
-    if window is None:
-        return found
-    if math.isnan(window.distance) and math.isnan(window.angle):
-        least = f"{100.0 * LEAST_DISTANCE:g} cm"
-        found.append(f"the robot walked less than {least}: it has no figures per metre")
-    names = [f"controller.{leg}.swinging" for leg in LEG_NAMES]
-    recorded = set(names) <= set(window.recording.names)
-    if recorded and not (window.recording.columns(names) > 0.5).any():
-        found.append("no foot swung: foot_error_swing has no value")
-    return found
 
 
 def heat_warnings(recording: Recording, servo: Servo) -> list[str]:

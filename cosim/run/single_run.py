@@ -42,18 +42,17 @@ from hexapod_cosim.cosim.results.locomotion import (
 from hexapod_cosim.cosim.results.metrics import compute_metrics, metric_columns
 from hexapod_cosim.cosim.results.warnings import (
     heat_warnings,
-    missing_metrics_warnings,
     off_map_warnings,
     short_run_warnings,
     unused_settings,
     walk_warnings,
 )
-from hexapod_cosim.cosim.results.window import View, is_drop
+from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
 from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant, run_surface
 from hexapod_cosim.cosim.scenario.controls import control_of
-from hexapod_cosim.cosim.scenario.events import event_log
 from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.cosim.scenario.sections import event_log
 from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.surface import Surface
 
@@ -194,8 +193,6 @@ def _warnings(plan: RunPlan, outcome: Outcome, view: View, fall: str) -> Iterato
     yield from heat_warnings(view.recording, plan.robot.servo)
     if outcome.status == COMPLETED:
         yield from short_run_warnings(view)
-        # a drop neither walks nor swings a foot
-        yield from [] if is_drop(view.recording) else missing_metrics_warnings(view)
 
 
 @cache

@@ -21,7 +21,6 @@ import numpy as np
 from hexapod_cosim.controller import Parts
 from hexapod_cosim.cosim.scenario.checks import check_interval, check_parameters, check_steps
 from hexapod_cosim.cosim.scenario.controls import read_control
-from hexapod_cosim.cosim.scenario.events import read_events
 from hexapod_cosim.cosim.scenario.records import (
     CONTROLS,
     GRAVITY,
@@ -37,6 +36,7 @@ from hexapod_cosim.cosim.scenario.records import (
 from hexapod_cosim.cosim.scenario.sections import (
     errors_of,
     read_commands,
+    read_events,
     read_gains,
     read_gravity,
     read_setting,

@@ -1,16 +1,19 @@
-"""Reads the sections of a scenario that are no plain records.
+"""Reads the sections of a scenario that are no plain records, and describes its events.
 
 Every reader takes the table and its name for messages, and raises RobotError or ScenarioError.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 from hexapod_cosim.controller.gains import SECTIONS
 from hexapod_cosim.cosim.scenario.records import (
+    ANGLE,
+    ATTITUDE,
     GRAVITY,
     GRAVITY_VECTOR,
     SETTINGS,
@@ -18,7 +21,18 @@ from hexapod_cosim.cosim.scenario.records import (
     STANCES,
     UNUSED,
     WALK_KEYS,
+    WHOLE_LEG,
+    AngleFault,
+    AttitudeFault,
     Command,
+    Event,
+    Fault,
+    Lost,
+    Push,
+    Scenario,
+    SensorFault,
+    ServoFault,
+    Tuning,
 )
 from hexapod_cosim.models import RobotError, ScenarioError
 from hexapod_cosim.models.ground.table import read_keys
@@ -36,6 +50,24 @@ from hexapod_cosim.models.soil.presets import soil_table
 
 # the parts of a gains file that a controller reads
 GAINS = {part: SECTIONS[part] for part in ("support", "hold", "limits", "paper")}
+SENSOR_TEXTS = {
+    "dead": "reads zero",
+    "stuck": "repeats its last reading",
+    "nan": "reads NaN",
+    "late": "is late by {delay:g} ms",
+    "noisy": "has a noise of {noise:g} %",
+}
+LOST_TEXTS = {
+    "command": "the joint commands are lost, and the last one holds",
+    "step": "macro-steps are dropped: the last readings and joint commands hold",
+}
+SERVO_TEXTS = {
+    "weak": "gives {share:g} of its torque",
+    "limp": "is limp",
+    "locked": "is locked",
+    "dead": "is limp",
+    "stuck": "is locked",
+}
 
 
 @contextmanager
@@ -108,3 +140,98 @@ def read_gravity(value: Any, where: str) -> tuple[float, float, float]:
         x, y, z = GRAVITY_VECTOR.read(value, where)
         return x, y, z
     return 0.0, 0.0, -GRAVITY.read(value, where)
+
+
+def read_events(value: Any) -> tuple[Event, ...]:
+    """Reads the entries [[events]]. Raises ScenarioError."""
+    if not isinstance(value, list | tuple):
+        fix = "write [[events]] with two brackets"
+        raise ScenarioError(
+            "wrong type", got=value, expected="entries [[events]]", fix=fix, where="events"
+        )
+    return tuple(_read_event(entry, f"events[{k}]") for k, entry in enumerate(value))
+
+
+def _read_event(table: Any, where: str) -> Event:
+    """Reads an event, whose keys say what it is: `lost`, `parameter`, `sensor` (angle or
+    attitude), `joint` (of a servo), `leg` or `fault` (of a force sensor), or else a push.
+    """
+    kinds = (Push, Fault, AngleFault, AttitudeFault, ServoFault, Lost, Tuning)
+    known = [key for kind in kinds for key in specs(kind)]
+    refuse_unknown_keys(expect_table(table, where), list(dict.fromkeys(known)), where)
+    event: Event = read_record(_kind_of_event(table, f"{where}.sensor"), table, where)
+    _check_delay(event, where)
+    return event
+
+
+def _kind_of_event(table: Mapping[str, Any], where: str) -> type[Event]:
+    """Returns the record that the keys of an event belong to; `where` names its sensor."""
+    if "lost" in table:
+        return Lost
+    if "parameter" in table:
+        return Tuning
+    if "sensor" in table:
+        sensor = Choice((ANGLE, ATTITUDE)).read(table["sensor"], where)
+        return AngleFault if sensor == ANGLE else AttitudeFault
+    if "joint" in table:
+        return ServoFault
+    return Fault if {"leg", "fault"} & set(table) else Push
+
+
+def _check_delay(event: Event, where: str) -> None:
+    """Raises ScenarioError for a late reading without a delay, and for a delay of other faults."""
+    if not isinstance(event, SensorFault):
+        return
+    if (event.fault == "late") != (event.delay > 0.0):
+        late = event.fault == "late"
+        raise ScenarioError(
+            "a late reading without a delay" if late else "a delay of readings that are not late",
+            got=f"fault = {event.fault!r} and delay = {event.delay:g} s",
+            expected="a delay above 0 with the fault late, and none with others",
+            fix='add delay = "20 ms"' if late else "delete delay, or write fault = 'late'",
+            where=where,
+        )
+
+
+def event_log(scenario: Scenario, simulated: float) -> list[dict[str, Any]]:
+    """Returns time [s from the start] and text of the events that began within `simulated` [s], in
+    order of time.
+    """
+    begun = [event for event in scenario.events if event.time < simulated]
+    begun.sort(key=lambda event: event.time)
+    return [{"time": event.time, "text": describe_event(event)} for event in begun]
+
+
+def describe_event(event: Event) -> str:
+    """Returns what happens at an event, and for how long."""
+    match event:
+        case Push():
+            text = f"a push of {_vector(event.force)} N and {_vector(event.torque)} N m"
+        case Fault():
+            text = f"the force sensor of {event.leg} {_reading(event)}"
+        case AngleFault():
+            text = f"the angle sensor of {event.leg}.{event.joint} {_reading(event)}"
+        case AttitudeFault():
+            text = f"the attitude sensor {_reading(event)}"
+        case ServoFault():
+            which = f"servo of {event.leg}.{event.joint}"
+            if event.joint == WHOLE_LEG:
+                which = f"leg {event.leg}"
+            text = f"the {which} {SERVO_TEXTS[event.fault].format(share=event.share)}"
+        case Lost():
+            text = LOST_TEXTS[event.lost]
+        case Tuning():
+            return f"{event.parameter} becomes {event.value:g}"
+    return text if math.isinf(event.duration) else f"{text}, for {event.duration:g} s"
+
+
+def _reading(event: SensorFault) -> str:
+    """Returns what a faulty sensor reads."""
+    if isinstance(event, AttitudeFault) and event.fault == "dead":
+        return "reads level and at rest"
+    noise = 100.0 * event.noise if isinstance(event, Fault) else 0.0
+    return SENSOR_TEXTS[event.fault].format(delay=1000.0 * event.delay, noise=noise)
+
+
+def _vector(values: tuple[float, ...]) -> str:
+    return f"[{', '.join(f'{value:g}' for value in values)}]"

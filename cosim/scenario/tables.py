@@ -68,18 +68,8 @@ def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[s
             raise ScenarioError(
                 "not a setting", got=text, expected="NAME=VALUE", fix=fix, where="--set"
             )
-        if not _is_unicode(text):
-            fix = "set LC_ALL=C.UTF-8"
-            raise ScenarioError(
-                "not a setting", got=text, expected="characters in UTF-8", fix=fix, where="--set"
-            )
         values[name] = parse_value(value)
     return with_values(table, values)
-
-
-def _is_unicode(text: str) -> bool:
-    """Returns whether a word of the command line had no bytes that its encoding lacks."""
-    return not any(0xD800 <= ord(letter) < 0xE000 for letter in text)
 
 
 def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:

@@ -46,7 +46,6 @@ POLICY = Component(
     prefix="policy_",
     structure="Policy",
     suffix="_policy",
-    package="hexapod_cosim.extensions.gym",
     description=(
         "Learned policy of a hexapod robot: angles of its {joints} joints from a body velocity and "
         "from measurements by a multilayer perceptron"

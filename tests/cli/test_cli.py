@@ -223,19 +223,7 @@ def test_simulate_without_json_prints_a_table_and_the_files(call: Call, tmp_path
     code, out, _ = call("simulate", "walk_flat", "-o", tmp_path / "out", *enough)
     assert code == 0
     assert all(name in out for name in SHOWN)
-    assert "No run is long enough" not in out
     assert f"wrote {tmp_path / 'out'}/" in out
-
-
-def test_a_run_too_short_for_metrics_prints_a_sentence_instead_of_a_table_of_dashes(
-    call: Call, tmp_path: Path
-) -> None:
-    code, out, err = call("simulate", "walk_flat", "-o", tmp_path / "out", *QUICK)
-    assert code == 0
-    assert "No run is long enough for the 20 metrics of a walk" in out
-    assert "slip_per_metre" not in out
-    assert "energy_residual" in out
-    assert "too short for metrics" in err
 
 
 def test_both_engines_walk_the_same_walk_and_leave_the_same_files(

@@ -48,7 +48,6 @@ def test_names_are_offered_where_they_go(offered: Ask) -> None:
         == offered("export", "--controller", "c")
         == ["compliant"]
     )
-    assert offered("export", "--gait", "w") == ["wave"]
     assert offered("list", "sc") == ["scenarios"]
     assert "simulate" in offered("")
     assert "--output" in offered("simulate", "--")
@@ -65,7 +64,6 @@ def test_keys_of_set_are_those_of_the_scenario_and_of_the_fmu(offered: Ask) -> N
     ]
     assert offered("simulate", "--set", "LF.coxa.m") == ["LF.coxa.mass="]
     assert offered("simulate", "--set", "torso.push") == []  # an input
-    assert offered("design", "--set", "phase") == ["phase_margin="]
 
 
 def ask_shell(shell: str, typed: str) -> list[str]:

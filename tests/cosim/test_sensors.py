@@ -21,9 +21,9 @@ from hexapod_cosim.cosim.master.sensors import CONTACT, errors_of
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.folder import read_facts, write_result
 from hexapod_cosim.cosim.run.single_run import simulate
-from hexapod_cosim.cosim.scenario.events import describe_event, event_log
 from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table
 from hexapod_cosim.cosim.scenario.schedule import make_schedule
+from hexapod_cosim.cosim.scenario.sections import describe_event, event_log
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, ScenarioError
 
 STEPS = 10

@@ -4,13 +4,11 @@ results and their manifest.
 
 from __future__ import annotations
 
-import html
 import io
 import posixpath
 import re
 import zipfile
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import fmpy
@@ -109,26 +107,6 @@ def test_types_carry_units_and_angles_are_shown_in_degrees(exported: Path) -> No
         "deg/s",
     )
     assert variables["contact.law"].declaredType.name == "ContactLaw"
-
-
-@pytest.mark.parametrize("robot", list_robots())
-def test_the_page_s_quick_start_runs_as_it_stands(
-    plant_build: Path,
-    tmp_path: Path,
-    robot: str,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    fmu = export_fmu(load_robot(robot), tmp_path / f"{robot}.fmu")
-    with zipfile.ZipFile(fmu) as archive:
-        page = archive.read("documentation/index.html").decode()
-    snippet = re.search(r"<pre><code>(.*?)</code></pre>", page, re.DOTALL)
-    assert snippet
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, Any] = {}
-    exec(html.unescape(snippet[1]), names)
-    assert np.abs(names["result"]["torso.position[2]"]).max() > 1e-4  # m, moved by the push
-    assert capsys.readouterr().out.endswith("]\n")
 
 
 @pytest.mark.parametrize(("fmi", "platforms"), [(2, None), (2, "sources"), (3, None)])

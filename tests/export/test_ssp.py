@@ -12,7 +12,7 @@ import pytest
 from feed_through import FOOT, JOINT, make_feed_through
 from fmpy.ssp.ssd import read_ssd
 
-from hexapod_cosim.cosim.cli.packages import read_package
+from hexapod_cosim.cosim.cli.simulating import read_package
 from hexapod_cosim.cosim.common.plant_files import fmi2_platform
 from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.export.ssp import (

@@ -19,7 +19,7 @@ from hexapod_cosim.cosim.results.locomotion import describe_fall, missed_end
 from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.cosim.results.side_by_side import compare_all, read_seeds, write_seeds
 from hexapod_cosim.cosim.results.summary import Summary
-from hexapod_cosim.cosim.results.warnings import friction_warnings, missing_metrics_warnings
+from hexapod_cosim.cosim.results.warnings import friction_warnings
 from hexapod_cosim.cosim.results.window import View
 
 STANDING = 0.130  # m
@@ -202,28 +202,6 @@ def test_a_slope_that_friction_does_not_hold_is_warned_of_with_the_acceleration(
     assert friction_warnings(parameters(**SLOPE, **changes)) == [
         f"the robot slides: the ground's slope pulls it downhill {says}"
     ]
-
-
-STAYED = "the robot walked less than 1 cm: it has no figures per metre"
-NO_SWING = "no foot swung: foot_error_swing has no value"
-
-
-@pytest.mark.parametrize(("distance", "said"), [(0.0, [STAYED]), (0.0099, [STAYED]), (0.0101, [])])
-def test_a_walk_shorter_than_a_centimetre_says_why_figures_per_metre_are_missing(
-    distance: float, said: list[str]
-) -> None:
-    """The distance is that of the judged cycles; the torso moves evenly."""
-    walk = Walk()
-    judged = walk.time[-1] - 2.0 * PERIOD
-    walk.set("torso.position[1]", distance * walk.time / judged)
-    assert missing_metrics_warnings(View(walk.recording, PARAMETERS, PERIOD)) == said
-
-
-def test_a_robot_whose_feet_never_swing_says_why_there_is_no_error_in_swing() -> None:
-    walk = Walk(planned=True)
-    assert missing_metrics_warnings(View(walk.recording, PARAMETERS, PERIOD)) == [NO_SWING]
-    walk.set("controller.LF.swinging", walk.time > walk.time[-1] - 1.0)
-    assert missing_metrics_warnings(View(walk.recording, PARAMETERS, PERIOD)) == []
 
 
 # Which runs arrive at the end of the commanded path, and that comparisons count no others.

@@ -1,4 +1,4 @@
-"""What URDF and MJCF files say of a robot's servos, and what `hexapod export` says is left out."""
+"""What MJCF files say of a robot's servos."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import xml.etree.ElementTree as ET
 import pytest
 from test_measured_servos import with_servo
 
-from hexapod_cosim.cosim.cli.exporting import FORMATS, left_out
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.mjcf import robot_to_mjcf
 
@@ -26,16 +25,3 @@ def test_mjcf_has_viscous_friction_and_the_damping_of_the_back_emf() -> None:
     assert [float(motor.get("kv", "")) for motor in motors] == pytest.approx(
         [back_emf] * 18, rel=1e-3
     )
-
-
-def test_an_ideal_servo_loses_nothing_and_rotors_their_spin() -> None:
-    ideal = load_robot("athena").servo
-    assert [left_out(ideal, form) for form in FORMATS.values()] == [[], []]
-    measured = with_servo(load_robot("athena"), "mx64_m1", gear_ratio=200.0).servo
-    limits, friction = (
-        "the limits of the motor's voltage",
-        "friction that depends on load and speed",
-    )
-    spin = "the rotors' angular momentum"
-    assert left_out(measured, FORMATS["urdf"]) == [friction, limits, spin]
-    assert left_out(measured, FORMATS["mjcf"]) == [limits, spin]

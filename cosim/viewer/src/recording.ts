@@ -49,7 +49,7 @@ export class Recording {
   }
 }
 
-/** Unpacks what cosim/report/packing.py has packed. */
+/** Unpacks what cosim/report/columns.py has packed. */
 export async function unpack(run: Packed): Promise<Recording> {
   const planes = await inflate(run.data);
   const size = run.rows * (run.columns.length + 2);

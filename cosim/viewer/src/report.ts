@@ -191,8 +191,9 @@ function feetOf(runs: readonly Run[], label: string, clock: Clock): number[][] {
   return found && pose ? footCentres(found.run.robot, pose).map((foot) => foot.toArray()) : [];
 }
 
-/** Opens the report of this page; where that fails, the page says why. */
-export function startReport(): void {
+// One bundle serves all kinds of pages, so that a wheel holds the libraries once. A report has its
+// recording inside; tools/build_viewer.py adds the pages of the extensions.
+if (byId("recording")) {
   open().catch((error: unknown) => {
     showReason(
       byId("stage"),

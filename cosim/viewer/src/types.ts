@@ -39,7 +39,7 @@ export interface Material {
   readonly text: string;
 }
 
-/** Columns packed by cosim/report/packing.py: name, size of a step and value of step 0. */
+/** Columns packed by cosim/report/columns.py: name, size of a step and value of step 0. */
 export interface Packed {
   readonly rows: number;
   readonly start: number;

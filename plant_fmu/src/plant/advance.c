@@ -135,8 +135,8 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   if (status == HX_OK) status = hx_input_check(input, plant->message);
   if (status != HX_OK) return status;
   hx_copy_state(&plant->model, before, &plant->state);
-  const int told = !ramp && (events->stop || before->call_input != 0.0);
-  const hxStepCall call = {input, ramp, told ? input_fingerprint(input) : 0.0, before->time};
+  const int compared = !ramp && (events->stop || before->call_input != 0.0);
+  const hxStepCall call = {input, ramp, compared ? input_fingerprint(input) : 0.0, before->time};
   const int locks = hx_plant_update_locks(plant, input);
   hx_footprints_begin(&plant->footprints);
   events->footprints = &plant->footprints;

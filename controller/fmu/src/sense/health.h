@@ -1,4 +1,4 @@
-/* health.h - finds servos that do not do what they are told, and when they do again (C57). Python:
+/* health.h - finds servos that do not follow their commands, and when they do again (C57). Python:
  * controller/sense/health.py. */
 #ifndef HX_HEALTH_H
 #define HX_HEALTH_H
