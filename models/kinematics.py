@@ -199,8 +199,9 @@ def _child_state(joint: JointModel, parent: Array, q: float, qd: float) -> Array
     """Returns the child's state (13,) at a joint angle [rad] and speed [rad/s]."""
     r_i, p_i, v_i, w_i = split(parent)
     p_j = quaternion_product(quaternion_product(p_i, joint.zero), axis_quaternion(joint.s_j, q))
-    sP_i, sP_j = rotation_matrix(p_i) @ joint.point_i, rotation_matrix(p_j) @ joint.point_j
-    w_j = w_i + qd * (rotation_matrix(p_i) @ joint.s_i)
+    R_i = rotation_matrix(p_i)
+    sP_i, sP_j = R_i @ joint.point_i, rotation_matrix(p_j) @ joint.point_j
+    w_j = w_i + qd * (R_i @ joint.s_i)
     v_j = v_i + cross(w_i, sP_i) - cross(w_j, sP_j)
     return np.concatenate([r_i + sP_i - sP_j, p_j, v_j, w_j])
 

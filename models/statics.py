@@ -21,10 +21,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from hexapod_cosim.models.actuator import servo_torque
+from hexapod_cosim.models.actuator import overrun, servo_torque, stop_torque
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force, foot_moment
-from hexapod_cosim.models.dynamics import masses, stop_torques
+from hexapod_cosim.models.dynamics import masses
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.ground.faces import ground, ground_height, ground_normal, surface_of
 from hexapod_cosim.models.kinematics import (
@@ -345,7 +345,8 @@ def _loads(robot: Robot, x: Array) -> Array:
     else:
         servo, zero = replace(robot.servo, mode="position"), np.zeros_like(angle)
         left_over += servo_torque(servo, angle, zero, robot.stance.ravel(), zero, zero)
-        left_over += stop_torques(robot, body).ravel()
+        past = overrun(angle, robot.angle_min.ravel(), robot.angle_max.ravel())
+        left_over += stop_torque(servo, past, zero)
     return np.column_stack([on_torso, left_over.reshape(LEGS, JOINTS)])
 
 

@@ -8,16 +8,13 @@ from pathlib import Path
 
 import typer
 
-from hexapod_cosim.controller import Gait
-from hexapod_cosim.cosim.cli.running import given_gains
+from hexapod_cosim.controller import Gait, load_gains
 from hexapod_cosim.cosim.cli.terminal import refuse_unused, show_files, show_json, waiting, warn
 from hexapod_cosim.cosim.cli.terrains import surfaces_from
 from hexapod_cosim.cosim.common.files import write_text, writing_into
 from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.export.robot_package import export_package, read_values
 from hexapod_cosim.cosim.interface.controller import ControllerSetup
-from hexapod_cosim.cosim.run.gait_selection import compliant_gait
-from hexapod_cosim.cosim.run.plan import make_setup
 from hexapod_cosim.cosim.scenario.records import CHOSEN, OWN
 from hexapod_cosim.models import HexapodError, Robot, load_robot, unknown_name
 from hexapod_cosim.models.mjcf import robot_to_mjcf
@@ -143,6 +140,8 @@ def _in_stance(robot: Robot, stance: str) -> tuple[Robot, Gait | None]:
         raise unknown_name("stance", stance, (OWN, CHOSEN))
     if stance == OWN:
         return robot, None
+    from hexapod_cosim.cosim.run.gait_selection import compliant_gait
+
     with waiting("choosing the stance"):
         walk = compliant_gait(robot)
     return walk.robot, walk.gait
@@ -206,7 +205,9 @@ def _controller_setup(
     robot: Robot, request: Request, control: str, gait: Gait | None
 ) -> ControllerSetup:
     """Builds the controller's setup; shows a warning for gains of another robot or period."""
-    gains = given_gains(request.gains)
+    from hexapod_cosim.cosim.run.plan import make_setup
+
+    gains = None if request.gains is None else load_gains(request.gains)
     designs = control != "kinematic" and gains is None
     with waiting("designing the gains" if designs else None):
         setup = make_setup(

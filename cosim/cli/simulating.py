@@ -27,7 +27,6 @@ from hexapod_cosim.cosim.export.ssp import SSD
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.cosim.report.tables import about_accuracy, metric_rows, with_errors
-from hexapod_cosim.cosim.report.writing import write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.folder import (
@@ -122,6 +121,8 @@ def _simulate(
             write_accuracy(folder.path, found.as_table())
             accuracies = {label: found}
         if plan.outputs.plots:
+            from hexapod_cosim.cosim.report.writing import write_report
+
             with waiting("drawing figures and report"):
                 runs = {label: stored_result(result)}
                 files += write_report(runs, folder.path, warn=warn, accuracies=accuracies)

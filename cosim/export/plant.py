@@ -214,7 +214,8 @@ def _reference(interface: Interface, members: dict[str, bytes], fmi: int) -> dic
     if fmi != 2 or interface.component is not PLANT or not any(own in name for name in members):
         return {}
     with TemporaryFolder("export") as folder:
-        return reference_members(interface, write_archive(folder / "trial.fmu", members))
+        trial = write_archive(folder / "trial.fmu", members, ZIP_STORED)
+        return reference_members(interface, trial)
 
 
 def write_archive(

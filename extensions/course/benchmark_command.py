@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,47 +20,31 @@ from hexapod_cosim.cosim.cli.terminal import (
     show_json,
     show_table,
     show_text,
-    warn,
 )
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json
 from hexapod_cosim.cosim.control.controllers import check_control
-from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.folder import ResultsFolder, results_folder
-from hexapod_cosim.cosim.scenario.controls import AT, CHOOSER
+from hexapod_cosim.cosim.scenario.controls import AT, CHOOSER, Control, parse_controls
 from hexapod_cosim.cosim.scenario.records import CHOSEN, CONTROLS
 from hexapod_cosim.extensions.course import texts
 from hexapod_cosim.extensions.course.records import (
     JUDGE,
     SPLITS,
     Course,
-    Entry,
-    lacking,
     load_course,
-    read_entries,
 )
 from hexapod_cosim.extensions.course.report import write_course_report
 from hexapod_cosim.extensions.course.runs import Run, run_count, run_course
 from hexapod_cosim.extensions.course.store import FILES, read_table, write_result
 from hexapod_cosim.extensions.course.table import Table
 
-EPILOG = (
-    "A robot that falls or gets stuck is a result: it counts as a failure and is in no mean. "
-    "Ctrl-C writes the table of the runs that are done."
-)
+EPILOG = "A robot that falls or gets stuck is a result: it counts as a failure and is in no mean."
 
 BENCHMARK = "benchmark"  # kind of a folder with its result
 MAX_SEEDS = 1000
 OTHERS = tuple(name for name in CONTROLS if name != CHOOSER)
 DEFAULT = (*OTHERS, *(f"{name}{AT}{CHOSEN}" for name in OTHERS), CHOOSER)
-Without = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--without",
-        metavar="PART",
-        help="Add a column: the last control without this part of the compliant control.",
-    ),
-]
 Cases = Annotated[
     list[str] | None,
     typer.Option("--case", metavar="NAME", help="A case or a class of the course, repeated."),
@@ -69,7 +53,6 @@ Cases = Annotated[
 
 def benchmark(
     controls: ControlNames = None,
-    without: Without = None,
     split: Annotated[
         str,
         typer.Option("--split", metavar="|".join(SPLITS), help="Cases to judge or to tune on."),
@@ -106,14 +89,13 @@ def benchmark(
     stance that compliant control chooses (kinematic@chosen). The first control is the reference; a
     control in that walk is compared with the first one in it, and compliant control with both.
     """
-    entries = read_entries(controls or DEFAULT, without or ())
+    laws = parse_controls(controls or DEFAULT, where="--control")
     course = load_course(
         split, names=cases or (), seeds=seeds, quick=quick, settings=settings or ()
     )
-    check_control(course.cases[0].scenario, [entry.control for entry in entries])
+    check_control(course.cases[0].scenario, laws)
     options = {
         "control": controls,
-        "without": without,
         "case": cases,
         "set": settings,
         "seeds": seeds,
@@ -122,7 +104,7 @@ def benchmark(
     command = _command_line(options, split=split, quick=quick)
     with results_folder(output or Path("out") / BENCHMARK, own=FILES) as folder:
         table, content, files = _run_into(
-            folder, course, entries, given_gains(gains), workers, command
+            folder, course, laws, given_gains(gains), workers, command
         )
     if json:
         show_json(content)
@@ -136,41 +118,21 @@ def benchmark(
 def _run_into(
     folder: ResultsFolder,
     course: Course,
-    entries: Sequence[Entry],
+    laws: Sequence[Control],
     gains: Gains | None,
     workers: int | None,
     command: str,
 ) -> tuple[Table, dict[str, Any], list[Path]]:
-    """Runs the course and writes its result; an interrupt writes that of the completed runs."""
-    done: list[Run] = []
-
-    def table() -> Table:
-        labels = tuple(entry.label for entry in entries)
-        return Table(course, labels, tuple(done), lacking(entries))
-
+    """Runs the course and writes its result and report."""
     folder.begin()
-    try:
-        _collect(done, course, entries, gains=gains, workers=workers)
-    except KeyboardInterrupt:
-        with deferred_interrupts():
-            _write(table(), folder.path, command, complete=False)
-            _show(table())
-            total = run_count(course, entries)
-            warn(f"stopped after {len(done)} of {total} runs; their table is in {folder.path}")
-        raise
-    content, files = _write(table(), folder.path, command, complete=True)
-    title = f"Course {course.version}, {course.split}: {', '.join(table().controls)}"
+    runs = tuple(_collect(course, laws, gains=gains, workers=workers))
+    table = Table(course, tuple(law.label for law in laws), runs)
+    content, files = write_result(table, folder.path, command=command)
+    files += write_course_report(table, content, folder.path)
+    title = f"Course {course.version}, {course.split}: {', '.join(table.controls)}"
     facts = {"kind": BENCHMARK, "status": COMPLETED, "title": title, "command": command}
     write_json(folder.path / RUN_FILE, facts)
-    return table(), content, [folder.path / RUN_FILE, *files]
-
-
-def _write(
-    table: Table, folder: Path, command: str, *, complete: bool
-) -> tuple[dict[str, Any], list[Path]]:
-    """Writes result and report; returns the content of benchmark.json and the files."""
-    content, files = write_result(table, folder, command=command, complete=complete)
-    return content, [*files, *write_course_report(table, content, folder)]
+    return table, content, [folder.path / RUN_FILE, *files]
 
 
 def report_on(folder: Path) -> list[Path]:
@@ -179,24 +141,19 @@ def report_on(folder: Path) -> list[Path]:
 
 
 def _collect(
-    done: list[Run],
-    course: Course,
-    entries: Sequence[Entry],
-    *,
-    gains: Gains | None,
-    workers: int | None,
-) -> None:
-    """Runs the course and appends each run to `done`."""
-    total, failed = run_count(course, entries), 0
+    course: Course, laws: Sequence[Control], *, gains: Gains | None, workers: int | None
+) -> Iterator[Run]:
+    """Runs the course, shows the progress, and yields each run."""
+    failed = 0
     with (
-        counting_bar("benchmark", total, plain=True) as count,
-        closing(run_course(course, entries, gains=gains, workers=workers)) as runs,
+        counting_bar("benchmark", run_count(course, laws), plain=True) as count,
+        closing(run_course(course, laws, gains=gains, workers=workers)) as runs,
     ):
         count(0)
-        for run in runs:
-            done.append(run)
+        for done, run in enumerate(runs, start=1):
             failed += not run.success
-            count(len(done), failed)
+            count(done, failed)
+            yield run
 
 
 def _show(table: Table) -> None:

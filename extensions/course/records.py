@@ -13,9 +13,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.controller.gains import SWITCHES
 from hexapod_cosim.cosim.results.metric_table import METRICS, PER_RADIAN
-from hexapod_cosim.cosim.scenario.controls import Control, parse_controls
+from hexapod_cosim.cosim.scenario.controls import Control
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.tables import with_overrides, with_values
@@ -64,20 +63,6 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Entry:
-    """A column of the course: a control, with some of its parts off or not."""
-
-    label: str
-    control: Control
-    off: tuple[str, ...] = ()  # parts of the compliant control
-
-    def scenario(self, base: Scenario) -> Scenario:
-        """Returns a scenario under this control."""
-        parts = replace(base.compliance, **dict.fromkeys(self.off, False))
-        return replace(base, control=self.control.text, compliance=parts)
-
-
-@dataclass(frozen=True)
 class Course:
     """The cases of a split, and how they are run."""
 
@@ -88,37 +73,6 @@ class Course:
     arrive: float  # largest path error, or yaw drift of turns on the spot, of a success
     hash: str  # SHA-256 of all case files of both splits
     settings: tuple[str, ...] = ()  # NAME=VALUE, on top of every case
-
-
-def read_entries(controls: Sequence[str], without: Sequence[str] = ()) -> tuple[Entry, ...]:
-    """Returns the columns of a course. Raises HexapodError.
-
-    Args:
-        controls: texts of controls; the first is the reference.
-        without: parts; each adds a column with the last control and this part off.
-    """
-    found = parse_controls(controls, where="--control")
-    parts = SWITCHES
-    for part in without:
-        if part not in parts:
-            raise unknown_name("part", part, parts, where="--without", error=CourseError)
-    if without and not (found[-1].is_builtin and found[-1].name != "kinematic"):
-        raise CourseError(
-            "a control without parts",
-            got=found[-1].label,
-            expected="compliant or paper as the last --control",
-            fix="add --control compliant",
-            where="--without",
-        )
-    entries = [Entry(control.label, control) for control in found]
-    entries += [Entry(f"without {part}", found[-1], (part,)) for part in dict.fromkeys(without)]
-    return tuple(entries)
-
-
-def lacking(entries: Sequence[Entry]) -> dict[str, str]:
-    """Returns the labels of columns that lack a part, and of the control that has it."""
-    whole = {entry.control: entry.label for entry in entries if not entry.off}
-    return {entry.label: whole[entry.control] for entry in entries if entry.off}
 
 
 @dataclass(frozen=True)
@@ -247,10 +201,10 @@ def _cases_of(
         )
 
 
-def run_scenario(case: Case, *, entry: Entry, seed: int) -> Scenario:
+def run_scenario(case: Case, *, control: Control, seed: int) -> Scenario:
     """Returns the scenario of a run; a random surface gets the run's seed."""
     settings = dict(case.scenario.settings)
     terrain = settings.get("terrain", {})
     if "seed" in getattr(CATALOGUE.get(terrain.get("kind", "")), "parameters", {}):
         settings["terrain"] = {**terrain, "seed": seed}
-    return replace(entry.scenario(case.scenario), seed=seed, settings=settings)
+    return replace(case.scenario, control=control.text, seed=seed, settings=settings)

@@ -85,7 +85,6 @@ def write_course_report(table: Table, content: Mapping[str, Any], folder: Path) 
         title=f"Course {course.version}, split {course.split}: {', '.join(table.controls)}",
         headline=headline(table),
         lead=lead(table),
-        warnings=[] if content["complete"] else ["The course was stopped before its end."],
         panels=panels(table),
         headings=HEADINGS,
         classes=texts.class_rows(table),

@@ -10,8 +10,9 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.results.locomotion import missed_end
 from hexapod_cosim.cosim.results.summary import UNBALANCED, Summary
 from hexapod_cosim.cosim.run.batch import run_batch
+from hexapod_cosim.cosim.scenario.controls import Control
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.extensions.course.records import QUANTITIES, Case, Course, Entry, run_scenario
+from hexapod_cosim.extensions.course.records import QUANTITIES, Case, Course, run_scenario
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Run:
 
 def run_course(
     course: Course,
-    entries: Sequence[Entry],
+    controls: Sequence[Control],
     *,
     gains: Gains | None = None,
     workers: int | None = None,
@@ -42,23 +43,25 @@ def run_course(
     The runs do not depend on `workers`. Close the iterator where the loop over it may be left
     early.
     """
-    orders = list(_orders(course, entries))
+    orders = list(_orders(course, controls))
     scenarios = [scenario for _, _, scenario in orders]
     batch = run_batch(scenarios, gains=gains, workers=workers, compiled=True)
     with closing(batch) as summaries:
-        for (case, entry, _), summary in zip(orders, summaries, strict=True):
-            yield judged(case, entry, summary, arrive=course.arrive)
+        for (case, control, _), summary in zip(orders, summaries, strict=True):
+            yield judged(case, control, summary, arrive=course.arrive)
 
 
-def _orders(course: Course, entries: Sequence[Entry]) -> Iterator[tuple[Case, Entry, Scenario]]:
+def _orders(
+    course: Course, controls: Sequence[Control]
+) -> Iterator[tuple[Case, Control, Scenario]]:
     """Yields case, control and scenario of each run."""
     for case in course.cases:
         for seed in course.seeds:
-            for entry in entries:
-                yield case, entry, run_scenario(case, entry=entry, seed=seed)
+            for control in controls:
+                yield case, control, run_scenario(case, control=control, seed=seed)
 
 
-def judged(case: Case, entry: Entry, summary: Summary, *, arrive: float) -> Run:
+def judged(case: Case, control: Control, summary: Summary, *, arrive: float) -> Run:
     """Returns the run of a summary: a success, or a failure with its reason.
 
     arrive: largest path error [m/m], or yaw drift [rad/rad] of a turn on the spot, of a success.
@@ -66,7 +69,7 @@ def judged(case: Case, entry: Entry, summary: Summary, *, arrive: float) -> Run:
     values = {quantity.name: quantity.value(summary.metrics) for quantity in QUANTITIES}
     return Run(
         case=case.name,
-        control=entry.label,
+        control=control.label,
         seed=summary.seed,
         failure=failure_of(summary, arrive=arrive),
         values=values,
@@ -82,6 +85,6 @@ def failure_of(summary: Summary, *, arrive: float) -> str:
     return missed_end(summary.metrics, arrive=arrive)
 
 
-def run_count(course: Course, entries: Sequence[Entry]) -> int:
+def run_count(course: Course, controls: Sequence[Control]) -> int:
     """Returns the number of runs of a course."""
-    return len(course.cases) * len(course.seeds) * len(entries)
+    return len(course.cases) * len(course.seeds) * len(controls)

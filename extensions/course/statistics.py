@@ -1,8 +1,6 @@
 """Intervals of success rates, and of medians over cases.
 
-The success rate of k of n runs has Wilson's interval, with z the normal quantile of 97.5 %:
-
-    (k + z^2/2 -+ z sqrt(k (n - k)/n + z^2/4)) / (n + z^2)
+The success rate has Wilson's interval.
 
 The ratio of a case is the mean of a quantity over its pairs of runs under a control, over the mean
 under the reference. Of several cases the median of the ratios counts. Its interval is a percentile
@@ -62,16 +60,12 @@ class Rate:
 
 def wilson(successes: int, runs: int) -> Interval:
     """Returns the share of successes with Wilson's interval."""
-    from scipy.special import ndtri  # noqa: PLC0415  slow to import
+    from scipy.stats import binomtest  # noqa: PLC0415  slow to import
 
     if not runs:
         return Interval(math.nan)
-    z = float(ndtri(0.5 + 0.5 * CONFIDENCE))
-    middle, whole = successes + 0.5 * z * z, runs + z * z
-    half = z * math.sqrt(successes * (runs - successes) / runs + 0.25 * z * z)
-    low = 0.0 if successes == 0 else (middle - half) / whole
-    high = 1.0 if successes == runs else (middle + half) / whole
-    return Interval(successes / runs, low, high)
+    found = binomtest(successes, runs).proportion_ci(CONFIDENCE, method="wilson")
+    return Interval(successes / runs, float(found.low), float(found.high))
 
 
 def median_ratio(samples: Sequence[Array]) -> Interval:

@@ -29,7 +29,7 @@ METHODS = {  # how the intervals are made
 PACKAGES = ("numpy", "scipy", "control", "fmpy")
 
 
-def result_table(table: Table, *, command: str, complete: bool) -> dict[str, Any]:
+def result_table(table: Table, *, command: str) -> dict[str, Any]:
     """Returns the content of benchmark.json; all of it but `machine` repeats bit by bit."""
     course = table.course
     return {
@@ -41,10 +41,8 @@ def result_table(table: Table, *, command: str, complete: bool) -> dict[str, Any
             "settings": list(course.settings),
         },
         "command": command,
-        "complete": complete,
         "controls": list(table.controls),
         "reference": table.reference,
-        "lacking": dict(table.parts),
         "seeds": list(course.seeds),
         "versions": {  # that figures depend on
             "hexapod-cosim": package_version(),
@@ -117,8 +115,7 @@ def read_table(folder: Path) -> tuple[Table, dict[str, Any]]:
                 where=str(folder / RESULT),
             )
         runs = tuple(_read_runs(folder / RUNS))
-        table = Table(course, tuple(content["controls"]), runs, dict(content.get("lacking", {})))
-        return table, content
+        return Table(course, tuple(content["controls"]), runs), content
     except (KeyError, TypeError, ValueError, OSError) as error:
         raise CourseError(
             "damaged result",
@@ -140,11 +137,9 @@ def _read_runs(path: Path) -> Iterator[Run]:
             yield Run(row["case"], row["control"], int(row["seed"]), row["failure"], values)
 
 
-def write_result(
-    table: Table, folder: Path, *, command: str, complete: bool
-) -> tuple[dict[str, Any], list[Path]]:
+def write_result(table: Table, folder: Path, *, command: str) -> tuple[dict[str, Any], list[Path]]:
     """Writes RESULT and RUNS; returns the content of RESULT and the files."""
-    content = result_table(table, command=command, complete=complete)
+    content = result_table(table, command=command)
     write_json(folder / RESULT, content)
     write_runs(folder / RUNS, table.runs)
     return content, [folder / RESULT, folder / RUNS]

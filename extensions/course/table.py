@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -125,8 +125,6 @@ class Table:
     course: Course
     controls: tuple[str, ...]  # the first one is the reference of those in its walk
     runs: tuple[Run, ...]
-    # columns that lack a part: their label -> that of the control with all its parts
-    parts: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def reference(self) -> str:
@@ -140,10 +138,7 @@ class Table:
         Compliant control, which walks in a gait and stance of its own choice, has a second column:
         against the reference in that gait and stance, if this was run.
         """
-        found = {
-            label: (label, self.parts.get(label) or reference_of(label, self.controls))
-            for label in self.controls
-        }
+        found = {label: (label, reference_of(label, self.controls)) for label in self.controls}
         twin = f"{self.reference}{AT}{CHOSEN}"
         if {CHOOSER, twin} <= set(self.controls):
             found[f"{CHOOSER} against {twin}"] = CHOOSER, twin
@@ -153,7 +148,7 @@ class Table:
     def cases(self) -> Mapping[tuple[str, str], CaseFigures]:
         """Figures by case and column, of the cases that were run."""
         by_place: dict[tuple[str, str], list[Run]] = {}
-        for run in whole_seeds(self.runs, len(self.controls)):
+        for run in self.runs:
             by_place.setdefault((run.case, run.control), []).append(run)
         return {
             (case.name, column): CaseFigures(
@@ -189,11 +184,6 @@ class Table:
         """Returns the cases of a sweep under a control, in the order of their heights."""
         found = [case for case in self.cases_of(ALL, control) if case.case.sweep == name]
         return tuple(sorted(found, key=lambda case: case.case.height))
-
-
-def whole_seeds(runs: Sequence[Run], controls: int) -> Sequence[Run]:
-    """Returns the runs without those of a seed that not every control has run."""
-    return runs[: len(runs) // controls * controls]
 
 
 def _finite(values: Iterable[float]) -> Array:

@@ -1,4 +1,4 @@
-"""Runs many environments in C (loop/src/environments.c), in threads that share them.
+"""Runs many environments in C (loop/src/environments.c), over threads.
 
 `Batch` owns the plant's FMU, the memory that is exchanged with C and the threads. An action array
 goes in, arrays of observations, rewards and flags come out; all of them are views of the memory
@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import ctypes as ct
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -143,7 +145,8 @@ class Batch(Closing):
         if not self._owned.handle:
             got = message.value.decode(errors="replace")
             raise FmuError("the environments cannot be created", got=got, fix="use fewer")
-        self._owned.count, self._owned.threads = self.count, self.threads
+        if self.threads > 1:
+            self._owned.pool = ThreadPoolExecutor(self.threads - 1)
 
     def _allocate(self) -> None:
         """Allocates the arrays that are exchanged with C."""
@@ -244,9 +247,8 @@ class Batch(Closing):
         numbers = None if seeds is None else np.array(seeds, dtype=np.uint64)
         starting = np.ones(self.count, np.uint8) if mask is None else checked_mask(mask, self.count)
         for _ in range(STARTS):
-            self._owned.call(
+            self._in_threads(
                 self._library.hx_environments_reset,
-                self._handle(),
                 starting.ctypes.data,
                 None if numbers is None else numbers.ctypes.data,
             )
@@ -262,7 +264,19 @@ class Batch(Closing):
 
         An environment whose action is not finite does not step: it is `refused`.
         """
-        self._owned.call(self._library.hx_environments_step, self._handle())
+        self._in_threads(self._library.hx_environments_step)
+
+    def _in_threads(self, call: Callable[..., None], *given: int | None) -> None:
+        """Calls a function of the library in all threads, each with a share of the robots."""
+        handle, pool = self._handle(), self._owned.pool
+        if pool is None or self._owned.is_inherited:
+            call(handle, 0, self.count, *given)
+            return
+        ends = [self.count * share // self.threads for share in range(self.threads + 1)]
+        others = [pool.submit(call, handle, *share, *given) for share in pairwise(ends[1:])]
+        call(handle, 0, ends[1], *given)
+        for other in others:
+            other.result()
 
     def message(self, index: int) -> str:
         """Returns the last message of an environment's FMUs."""

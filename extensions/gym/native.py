@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import ctypes as ct
 import os
-import threading
-from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import cache, partial
-from itertools import pairwise
+from functools import cache
 from pathlib import Path
-from queue import SimpleQueue
 
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
@@ -58,16 +55,6 @@ def environments_library() -> ct.CDLL:
     return load_loop("environments", "hx_environments_settings_size", "hxEnvSettings", HEADER)
 
 
-Job = Callable[[], None]
-
-
-def work(jobs: SimpleQueue[Job | None], done: SimpleQueue[None]) -> None:
-    """Does jobs until there is None; the thread of a batch."""
-    while (job := jobs.get()) is not None:
-        job()
-        done.put(None)
-
-
 @dataclass
 class Owned:
     """Threads, environments and the plant's FMU of one batch.
@@ -76,51 +63,27 @@ class Owned:
     """
 
     handle: int | None = None  # of hxEnvironments
-    count: int = 1  # of environments
-    threads: int = 1  # that share the environments, with the calling one
-    workers: list[threading.Thread] = field(default_factory=list)
-    jobs: SimpleQueue[Job | None] = field(default_factory=SimpleQueue)
-    done: SimpleQueue[None] = field(default_factory=SimpleQueue)
+    pool: ThreadPoolExecutor | None = None  # of all threads but the calling one
     plant: Fmu | None = None
     process: int = field(default_factory=os.getpid)  # that made them
 
-    def call(self, function: Callable[..., None], handle: int, *given: int | None) -> None:
-        """Calls a function in C for all environments, in each thread with a share of them.
-
-        In a process that was forked from the one that made the threads it uses the calling one
-        alone.
-        """
-        if self.threads == 1 or os.getpid() != self.process:
-            function(handle, 0, self.count, *given)
-            return
-        while len(self.workers) < self.threads - 1:
-            self.workers.append(
-                threading.Thread(target=work, args=(self.jobs, self.done), daemon=True)
-            )
-            self.workers[-1].start()
-        ends = [self.count * share // self.threads for share in range(self.threads + 1)]
-        for first, end in pairwise(ends[1:]):
-            self.jobs.put(partial(function, handle, first, end, *given))
-        function(handle, 0, ends[1], *given)
-        for _ in self.workers:
-            self.done.get()
+    @property
+    def is_inherited(self) -> bool:
+        """Whether this process was forked from the one that made them: it has no threads."""
+        return os.getpid() != self.process
 
     def free(self) -> None:
         """Ends the threads and frees the environments; may be called twice.
 
-        In a process that was forked from the one that made them it frees nothing: the threads do
-        not exist there, and the unpacked files belong to the first process.
+        An inherited batch frees nothing: the unpacked files belong to the first process.
         """
         handle, self.handle = self.handle, None
-        if os.getpid() != self.process:
+        if self.is_inherited:
             return
+        if self.pool:
+            self.pool.shutdown()
         if handle:
-            for _ in self.workers:
-                self.jobs.put(None)
-            for worker in self.workers:
-                worker.join()
             environments_library().hx_environments_destroy(handle)
         if self.plant:
             self.plant.close()
-        self.workers.clear()
         self.plant = None

@@ -172,12 +172,8 @@ def realtime(
     if json:
         show_json({**facts, "written": [str(path) for path in files]})
         return
-    heading, rows = live.table_of(facts)
     show_text(f"{facts['steps']} steps of {1e3 * step:g} ms")
+    rows = [[clock, *(f"{us:.0f}" for us in of.values())] for clock, of in facts["times"].items()]
+    heading = ["us", *facts["times"]["wall time"]]
     show_table(heading, rows, right=range(1, len(heading)))
-    met = "met" if facts["goal_met"] else "not met"
-    show_text(
-        f"goal {met}: {100 * live.GOAL_SHARE:g} % below {live.GOAL:g} us and none above "
-        f"{live.WORST:g} us of the thread's processor time"
-    )
     show_files(files)

@@ -11,9 +11,9 @@ from time import monotonic, sleep
 from typing import Any
 
 from hexapod_cosim.controller import BodyCommand
-from hexapod_cosim.extensions.live import state
+from hexapod_cosim.extensions.live import page
 from hexapod_cosim.extensions.live.messages import Action, Change, Drive, Leg, Message, Push
-from hexapod_cosim.extensions.live.recording import NO_FORCE, Force, Recording
+from hexapod_cosim.extensions.live.recording import LONGEST, NO_FORCE, Force, Recording
 from hexapod_cosim.extensions.live.robot import MOST_WEIGHTS, LiveRobot
 from hexapod_cosim.models import HexapodError
 
@@ -143,7 +143,7 @@ class Loop:
         self.robot.step(self._command, force)
         if self._recording is not None:
             self._recording.note(self._command, force, self.robot.limp)
-            if self.robot.fault or self._recording.is_full:
+            if self.robot.fault or self._recording.duration >= LONGEST:
                 self._end_recording()
         if self.robot.fault != before:
             self._note(self.robot.fault)
@@ -215,7 +215,7 @@ class Loop:
     def _end_recording(self) -> None:
         """Ends a recording and publishes it as a scenario."""
         recording, self._recording = self._recording, None
-        if recording is None or recording.steps == 0:
+        if recording is None or not recording.steps:
             return
         self._saved = recording.as_toml()
         self._publish("recording", self._saved)
@@ -233,7 +233,7 @@ class Loop:
 
     def _world(self) -> dict[str, Any]:
         robot = self.robot
-        return state.describe_world(robot.plan.robot, robot.parameters, robot.h)
+        return page.describe_world(robot.plan.robot, robot.parameters, robot.h)
 
     def _note(self, text: str) -> None:
         """Publishes a sentence."""
@@ -258,7 +258,7 @@ class Loop:
         command = self._command
         self._publish(
             "frame",
-            state.frame_of(self.robot)
+            page.frame_of(self.robot)
             | {
                 "late": {
                     "factor": round(self.pacer.factor, 4),

@@ -28,8 +28,6 @@ from hexapod_cosim.extensions.live.settings import Choices, control_texts
 from hexapod_cosim.models import HexapodError
 
 SHARES = (0.5, 0.99, 0.999, 0.9999)  # quantiles
-GOAL, GOAL_SHARE = 100.0, 0.9999  # us, and the share of steps below it
-WORST = 300.0  # us    goal of the slowest step
 EDGES = np.geomspace(1.0, 1e5, 101)  # us    of the bins
 FEWEST = 1000  # steps of a measurement
 FIGURE = "realtime"
@@ -93,38 +91,16 @@ def _measure(
 
 
 def facts_of(times: Times, step: float) -> dict[str, Any]:
-    """Returns counts, quantiles [us] and whether the goals are met, for people and for JSON."""
-    thread = times[CLOCKS[0]]
+    """Returns the number of steps and, by clock, quantiles and the largest time [us]."""
     return {
         "step": step,
-        "steps": len(thread),
-        "goal_met": goal_met(thread),
-        "times": {clock: _quantiles(values) for clock, values in times.items()},
+        "steps": len(times[CLOCKS[0]]),
+        "times": {
+            clock: {f"{100.0 * share:g} %": float(np.quantile(values, share)) for share in SHARES}
+            | {"largest": float(values.max())}
+            for clock, values in times.items()
+        },
     }
-
-
-def goal_met(thread: Micro) -> bool:
-    """Whether GOAL_SHARE of the steps took less than GOAL and none more than WORST [us]."""
-    return bool(np.mean(thread < GOAL) >= GOAL_SHARE and np.max(thread) <= WORST)
-
-
-def _quantiles(values: Micro) -> dict[str, float]:
-    """Returns quantiles and the largest [us], and the number of steps above the goals."""
-    return {
-        **{f"{100.0 * share:g} %": float(np.quantile(values, share)) for share in SHARES},
-        "largest": float(values.max()),
-        f"above {GOAL:g} us": int(np.sum(values >= GOAL)),
-        f"above {WORST:g} us": int(np.sum(values > WORST)),
-    }
-
-
-def table_of(facts: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
-    """Returns the heading and the rows of a table of the quantiles [us]."""
-    rows = [
-        [kind, *(f"{value:.0f}" for value in values.values())]
-        for kind, values in facts["times"].items()
-    ]
-    return ["us", *next(iter(facts["times"].values()))], rows
 
 
 def write(times: Times, step: float, folder: Path) -> list[Path]:
@@ -136,13 +112,11 @@ def write(times: Times, step: float, folder: Path) -> list[Path]:
 
 
 def draw(times: Times, step: float) -> Figure:
-    """Draws the histograms of both clocks beside each other, with the goals."""
+    """Draws the histograms of both clocks beside each other."""
     figure = Figure(figsize=(WIDTH, 2.6))
     axes = figure.subplots(1, 2, sharex=True, sharey=True)
     for (clock, values), axis, colour in zip(times.items(), axes, PALETTE, strict=False):
         axis.hist(values, bins=EDGES, color=colour, histtype="stepfilled", alpha=0.5)
-        for goal in (GOAL, WORST):
-            axis.axvline(goal, color="0.4", linestyle=":", linewidth=1.0)
         axis.set(title=clock, xlabel=f"doStep({1e3 * step:g} ms) [µs]")
     axes[0].set(ylabel="steps", xscale="log", yscale="log", xlim=(2.0, 5e4))
     return figure

@@ -19,8 +19,7 @@ from hexapod_cosim.cosim.interface.plant import enumerations_of, load_interface
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.extensions.live import settings as live
-from hexapod_cosim.extensions.live.page import render_page
-from hexapod_cosim.extensions.live.state import describe_world
+from hexapod_cosim.extensions.live.page import describe_world, render_page
 from hexapod_cosim.models import HexapodError, Robot, load_robot
 
 _TREE = Path(__file__).resolve().parents[2]

@@ -6,11 +6,11 @@ import math
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.extensions.course.records import (
     CLASSES,
@@ -19,12 +19,11 @@ from hexapod_cosim.extensions.course.records import (
     Course,
     CourseError,
     load_course,
-    read_entries,
     run_scenario,
 )
 from hexapod_cosim.models import load_robot
 
-KINEMATIC = read_entries(["kinematic"])[0]
+KINEMATIC = control_of("kinematic")
 JUDGED, TUNED = load_course("judge"), load_course("tune")
 # physical keys of which the splits may share a value, each with its reason
 SHARED: dict[str, list[Any]] = {
@@ -72,7 +71,7 @@ def test_the_splits_share_no_seed_and_so_no_random_surface() -> None:
     for course in (JUDGED, TUNED):
         case = next(case for case in course.cases if case.name == "rough_10")
         seeds = [
-            run_scenario(case, entry=KINEMATIC, seed=seed).settings["terrain"]["seed"]
+            run_scenario(case, control=KINEMATIC, seed=seed).settings["terrain"]["seed"]
             for seed in course.seeds
         ]
         assert seeds == list(course.seeds)
@@ -131,19 +130,6 @@ def test_a_sweep_rises_and_differs_in_the_height_alone() -> None:
     assert all(math.isnan(case.height) for case in JUDGED.cases if not case.sweep)
 
 
-def test_an_entry_switches_its_part_off_and_no_other() -> None:
-    reference, last, without = read_entries(["kinematic", "compliant"], ["posture"])
-    assert [reference.label, last.label, without.label] == [
-        "kinematic",
-        "compliant",
-        "without posture",
-    ]
-    base = JUDGED.cases[0].scenario
-    assert last.scenario(base).compliance == base.compliance
-    assert without.scenario(base).compliance == replace(base.compliance, posture=False)
-    assert without.scenario(base).control == "compliant"
-
-
 def test_cases_are_chosen_by_name_and_by_class() -> None:
     found = load_course(
         "judge", names=["soil", "flat_same"], quick=True, settings=["gait.period=1.25"]
@@ -166,4 +152,4 @@ def test_an_unknown_split_or_case_is_refused(split: str, names: list[str], text:
 def test_the_robot_of_each_case_suits_its_ground(course: Course) -> None:
     for case in course.cases:
         for seed in (0, 1009):
-            scenario_robot(run_scenario(case, entry=KINEMATIC, seed=seed))
+            scenario_robot(run_scenario(case, control=KINEMATIC, seed=seed))

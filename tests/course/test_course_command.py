@@ -1,4 +1,4 @@
-"""The command `hexapod benchmark`: determinism, files, report, interrupts, mistakes."""
+"""The command `hexapod benchmark`: determinism, files, report, mistakes."""
 
 from __future__ import annotations
 
@@ -10,34 +10,34 @@ from typing import Any
 import pytest
 from command import Call, assert_refused
 
-from hexapod_cosim.extensions.course.records import load_course, read_entries
+from hexapod_cosim.cosim.scenario.controls import parse_controls
+from hexapod_cosim.extensions.course.records import load_course
 from hexapod_cosim.extensions.course.runs import Run, run_course
 from hexapod_cosim.extensions.course.store import read_table
 
 KINEMATIC = ["--control", "kinematic"]
+LAWS = parse_controls(["kinematic"], where="test")
 
 
 @pytest.fixture(scope="module")
 def runs(plant_build: Path) -> tuple[Run, ...]:
     course = load_course("tune", names=["rough_10", "turn"], seeds=2)
-    return tuple(run_course(course, read_entries(["kinematic"]), workers=1))
+    return tuple(run_course(course, LAWS, workers=1))
 
 
 def test_runs_do_not_depend_on_the_number_of_workers(runs: tuple[Run, ...]) -> None:
     course = load_course("tune", names=["rough_10", "turn"], seeds=2)
-    parallel = tuple(run_course(course, read_entries(["kinematic"]), workers=2))
+    parallel = tuple(run_course(course, LAWS, workers=2))
     assert repr(parallel) == repr(runs)
     assert [run.seed for run in runs] == [1000, 1001, 1000, 1001]
     assert all(run.success for run in runs)
 
 
-def replayed(monkeypatch: pytest.MonkeyPatch, found: tuple[Run, ...], *, stop: bool) -> None:
-    """Makes the command get finished runs, and Ctrl-C after them if `stop`."""
+def replayed(monkeypatch: pytest.MonkeyPatch, found: tuple[Run, ...]) -> None:
+    """Makes the command get finished runs."""
 
     def again(*_: Any, **__: Any) -> Iterator[Run]:
         yield from found
-        if stop:
-            raise KeyboardInterrupt
 
     monkeypatch.setattr("hexapod_cosim.extensions.course.benchmark_command.run_course", again)
 
@@ -48,12 +48,12 @@ CHOICE = ["--split", "tune", "--seeds", "2", "--case", "rough_10", "--case", "tu
 def test_the_command_writes_json_runs_and_report(
     call: Call, tmp_path: Path, runs: tuple[Run, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    replayed(monkeypatch, runs, stop=False)
+    replayed(monkeypatch, runs)
     code, out, _ = call("benchmark", *CHOICE, "-o", str(tmp_path / "out"), "--json")
     content = json.loads(out)
     assert code == 0
     assert json.loads((tmp_path / "out" / "benchmark.json").read_text()) == content
-    assert (content["complete"], content["reference"]) == (True, "kinematic")
+    assert content["reference"] == "kinematic"
     assert content["course"]["split"] == "tune"
     assert content["seeds"] == [1000, 1001]
     assert list(content["cases"]) == ["rough_10", "turn"]
@@ -69,26 +69,11 @@ def test_the_command_writes_json_runs_and_report(
     assert (tmp_path / "out" / "report.html").read_text() == page
 
 
-def test_an_interrupt_writes_the_table_of_the_completed_runs(
-    call: Call, tmp_path: Path, runs: tuple[Run, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    replayed(monkeypatch, runs[:3], stop=True)
-    code, out, err = call("benchmark", *CHOICE, "-o", str(tmp_path / "out"))
-    assert code == 130
-    assert ["rough_10,", "kinematic", "2/2"] in [line.split()[:3] for line in out.splitlines()]
-    assert "stopped after 3 of 4 runs" in " ".join(err.split())
-    content = json.loads((tmp_path / "out" / "benchmark.json").read_text())
-    assert content["complete"] is False
-    assert (tmp_path / "out" / "report.html").is_file()
-    assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "interrupted"
-
-
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
         (["--control", "kinematc"], ["unknown control", "kinematic"]),
         (["--split", "train"], ["unknown split", "judge"]),
-        (["--control", "kinematic", "--without", "posture"], ["--without: ", "got 'kinematic'"]),
         (["--case", "rough_11"], ["unknown case", "rough_10"]),
     ],
 )
@@ -102,7 +87,7 @@ def test_mistakes_are_told_before_anything_is_run(
 def test_a_result_of_another_course_is_refused(
     call: Call, tmp_path: Path, runs: tuple[Run, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    replayed(monkeypatch, runs, stop=False)
+    replayed(monkeypatch, runs)
     call("benchmark", *CHOICE, "-o", str(tmp_path / "out"))
     path = tmp_path / "out" / "benchmark.json"
     content = json.loads(path.read_text())

@@ -125,12 +125,6 @@ def test_class_figures_are_medians_over_cases() -> None:
     assert table.classes["soil", "after"].success.runs == 12
 
 
-def test_a_seed_that_not_every_control_has_run_is_left_out() -> None:
-    table = table_of({"flat_tanh": (1.0, 2.0)}, "heat")
-    part = replace(table, runs=table.runs[:5])
-    assert [run.seed for run in part.cases["flat_tanh", "after"].runs] == [0, 1]
-
-
 def test_compliant_control_is_compared_in_the_tripod_and_in_its_own_walk() -> None:
     controls = ("kinematic", "kinematic@chosen", "compliant")
     course = replace(COURSE, cases=(case_of("flat_tanh"),))
@@ -160,19 +154,6 @@ def sweep_table(first_failures: Mapping[str, int], second_failures: Mapping[str,
         for control, failures in zip(CONTROLS, (first_failures, second_failures), strict=True)
     )
     return Table(replace(COURSE, cases=cases), CONTROLS, runs)
-
-
-def test_a_control_without_a_part_is_compared_with_the_whole_one() -> None:
-    controls = ("kinematic", "compliant", "without sway")
-    course = replace(COURSE, cases=(case_of("flat_tanh"),))
-    runs = tuple(
-        run_of("flat_tanh", control, seed, {"slip": slip})
-        for seed in course.seeds
-        for control, slip in zip(controls, (4.0, 1.0, 2.0), strict=True)
-    )
-    table = Table(course, controls, runs, {"without sway": "compliant"})
-    assert table.columns["without sway"] == ("without sway", "compliant")
-    assert table.classes["flat", "without sway"].ratio("slip").value == 2.0
 
 
 def test_cells_are_green_where_a_figure_falls_and_orange_where_it_rises() -> None:

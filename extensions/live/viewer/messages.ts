@@ -1,4 +1,4 @@
-/** What the loop sends (extensions/live/state.py and loop.py). SI units; legs LF LM LR RF RM RR. */
+/** What the loop sends (extensions/live/page.py and loop.py). SI units; legs LF LM LR RF RM RR. */
 
 import type { Ground, PackedSurface, Robot } from "../../../cosim/viewer/src/types";
 
