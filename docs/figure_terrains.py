@@ -31,11 +31,11 @@ def main() -> None:
         for axes in grid[len(names) :]:
             axes.set_axis_off()
         for axes, name in zip(grid, names, strict=False):
-            draw_surface(axes, make_surface(name, {}))
+            surface = make_surface(name, {})
+            draw_surface(axes, surface)
             draw_robot(axes, robot)
-            heights = axes.texts[0].get_text().partition(",")[0]
-            axes.texts[0].remove()
-            axes.set_title(f"{name}\n{heights}")
+            low, high = 1e3 * surface.height.min(), 1e3 * surface.height.max()
+            axes.set_title(f"{name}\n{low:.3g} to {high:.3g} mm")
             axes.tick_params(labelsize=5.0)
         figure.savefig(content, format="png", dpi=DPI)
     target = Path(__file__).parent / "images" / "terrains.png"

@@ -181,6 +181,15 @@ class Servo:
     # turns of the rotor for one of the joint, < 0: against it (eq. 54); 0: no angular momentum
     gear_ratio: Annotated[float, Number("1", at_least=-1e6, at_most=1e6)] = 0.0
 
+    @property
+    def drag(self) -> float:
+        """Torque that the joint's speed takes from a command [N m s/rad]: back-EMF (eq. 48) of a
+        motor, and viscous friction (eq. 49).
+        """
+        motor = self.drive == "motor"
+        back_emf = self.torque_constant**2 / self.resistance if motor else 0.0
+        return back_emf + self.viscous_friction
+
 
 def _unused_fields(servo: Servo) -> list[str]:
     """Returns the names of the fields from `drive` on if all have their defaults, else none."""

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.shares import LEAST_LOAD, indentation
+from hexapod_cosim.controller.comply.load_plan import LEAST_LOAD, indentation
 from hexapod_cosim.controller.gains import Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, along, clamp, square

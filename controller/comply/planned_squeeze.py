@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.shares import LEAST_LOAD, Shares, solve
+from hexapod_cosim.controller.comply.load_plan import LEAST_LOAD, Shares, solve
 from hexapod_cosim.controller.plane import Array, Plane, across, square
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.shares import LEAST_LOAD, Shares, indentation, solve
+from hexapod_cosim.controller.comply.load_plan import LEAST_LOAD, Shares, indentation, solve
 from hexapod_cosim.controller.gains import SupportGains
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, across, clamp, square
 from hexapod_cosim.controller.walk.gait import Gait

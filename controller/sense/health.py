@@ -45,7 +45,8 @@ class Health(Stateful):
         self, robot: Robot, gains: Gains | None, *, legs: LegSolver, period: float
     ) -> None:
         """Starts with sound servos. Kinematic control, without gains, does not watch them."""
-        self.stiffness, self.legs, self.period = robot.servo.kp, legs, period
+        self.stiffness, self.drag = robot.servo.kp, robot.servo.drag
+        self.legs, self.period = legs, period
         self.most = math.inf if gains is None else gains.limits.torque  # N m
         self.reset()
 
@@ -64,9 +65,10 @@ class Health(Stateful):
     def _unexplained(self, angle: Array, force: Array, command: JointCommand) -> Array:
         """Returns the torques (6, 3) of the servos' model that no load explains [N m]."""
         before = angle if self.angle is None else self.angle
-        load = (angle - before) / (self.period * self.legs.speed_max)
+        speed = (angle - before) / self.period
+        load = speed / self.legs.speed_max
         reached = command.angle_ref + self.period * command.speed_ref
-        torque = self.stiffness * (reached - angle) + command.torque_ref
+        torque = self.stiffness * (reached - angle) + command.torque_ref - self.drag * speed
         low = -self.most * clamp(1.0 + load, 0.0, 1.0)
         torque = clamp(torque, low, self.most * clamp(1.0 - load, 0.0, 1.0))
         return np.asarray(torque - self.legs.load_torques(angle, force))

@@ -61,6 +61,7 @@ class InverseDynamics:
         self.legs, self.period = legs, period
         self.gravity = float(np.linalg.norm(robot.gravity))
         self.rotor, self.friction = robot.servo.rotor_inertia, robot.servo.coulomb_friction
+        self.drag = robot.servo.drag
         self.torso_mass, self.torso_inertia = robot.torso.mass, robot.torso.inertia[2]
         self.torso_com = complex(robot.torso.com[0], robot.torso.com[1])
         self.torso_com_z = robot.torso.com[2]
@@ -175,6 +176,7 @@ class InverseDynamics:
         if before is not None and after is not None:
             turning = self._acceleration(before.angle, now.angle, after.angle)
         torque = self.rotor * turning + self.friction * np.tanh(speed / GEAR_SPEED)
+        torque += self.drag * speed
         # tau_1 = sum Im((u + i Y)^* F_h e^(-i psi))
         along = push * now.heading.conj()[:, None]
         torque[:, 0] += across(point.real + 1j * self.side, along).sum(axis=1)

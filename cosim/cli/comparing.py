@@ -11,7 +11,6 @@ from typing import Any
 
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
-    DRAWING,
     RunOptions,
     Words,
     check_accuracy,
@@ -32,12 +31,7 @@ from hexapod_cosim.cosim.cli.terminal import (
 from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.report.figures import draw_figures
-from hexapod_cosim.cosim.report.tables import (
-    about,
-    about_accuracy,
-    comparison_rows,
-    with_errors,
-)
+from hexapod_cosim.cosim.report.tables import about, about_accuracy, comparison_rows, with_errors
 from hexapod_cosim.cosim.report.writing import write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.facts import Result, gait_differences
@@ -82,13 +76,12 @@ def compare(
     work = _work(name, words, options)
     work.check()
     done = run_work(work, output or default_folder(name))
+    report = None if done.report is None else str(done.report)
     if as_json:
-        report = None if done.report is None else str(done.report)
         show_json({**_table(done.comparison, done.checked), "report": report})
     else:
         _show(done, work.walks)
-        report = "" if done.report is None else f"report: {done.report}"
-        show_text("\n".join(filter(None, (about(done.comparison), report))))
+        show_text("\n".join(filter(None, (about(done.comparison), report and f"report: {report}"))))
     return FELL if done.comparison.losses else SUCCESS
 
 
@@ -96,8 +89,8 @@ def _work(name: str, words: Words, options: RunOptions) -> Work:
     """Returns the comparison of a scenario."""
     seeds = words.seeds or 0
     plan = _plan(name, words.settings, seeds)
-    controls = _controls(words.controls or CONTROLS, plan)
     alike = words.controls or words.gains or plan.names_walk
+    controls = _controls(words.controls or CONTROLS, plan)
     chosen = () if alike else chosen_controls(CHOSEN_WALK, plan)
     command = words.command("compare", name)
     return Work(plan, controls, chosen, seeds, command, options, words.accuracy)
@@ -183,13 +176,12 @@ def run_work(work: Work, path: Path) -> Done:
                 command=work.command,
                 walks=work.walks,
             )
-            checked: dict[str, Accuracy] = {}
-            if work.accuracy:
-                checked = _accuracies(work, comparison)
+            checked = _accuracies(work, comparison) if work.accuracy else {}
+            if checked:
                 write_json(folder.path / METRICS_FILE, _table(comparison, checked))
             if figures is None:
                 return Done(results, comparison, checked, files, None)
-            with waiting(DRAWING):
+            with waiting("drawing figures and report"):
                 files += write_report(
                     stored,
                     folder.path,
@@ -281,10 +273,10 @@ def _all_seeds(work: Work, results: Mapping[str, Result], folder: Path) -> Compa
             done.append(run)
             report_count(len(done))
     write_seeds(folder / SEEDS, done)
-    labels = [control.label for control in work.compared]
-    comparison = compare_all(
-        {label: [run for run in done if run.control == label] for label in labels}
-    )
+    of_controls = {
+        one.label: [run for run in done if run.control == one.label] for one in work.compared
+    }
+    comparison = compare_all(of_controls)
     for text in comparison.warnings if work.seeds > 1 else comparison.losses:
         warn(text)
     return comparison

@@ -38,7 +38,6 @@ from hexapod_cosim.cosim.scenario.controls import Control, control_of, parse_con
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, unknown_name
 
-DRAWING = "drawing figures and report"
 UNTITLED = (
     "control=",
     "control.",

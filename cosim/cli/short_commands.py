@@ -55,16 +55,11 @@ def _report_again(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     if kind == "compare":
         return _report_comparison(folder, facts)
     if kind not in ("simulate", None):  # None: a run that has not ended
-        from hexapod_cosim.cosim.cli.app import all_commands
-
-        fix = f"run it again: {facts.get('command', '')}"
-        if kind not in {command.name for command in all_commands()}:
-            fix = f"install the extension with the command {kind}"
         raise HexapodError(
             "no installed command writes this report again",
             got=f"a folder of `hexapod {kind}`",
             expected=f"one of {', '.join(['simulate', 'compare', *reports])}",
-            fix=fix,
+            fix="run it again, or install the extension that wrote it",
             where=str(folder),
         )
     run = read_result(folder)

@@ -12,7 +12,6 @@ from xml.etree import ElementTree
 
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
-    DRAWING,
     RunOptions,
     Words,
     check_accuracy,
@@ -124,7 +123,7 @@ def _simulate(
         if plan.outputs.plots:
             from hexapod_cosim.cosim.report.writing import write_report
 
-            with waiting(DRAWING):
+            with waiting("drawing figures and report"):
                 runs = {label: stored_result(result)}
                 files += write_report(runs, folder.path, warn=warn, accuracies=accuracies)
     return Simulated(result, path, files, accuracies.get(label))

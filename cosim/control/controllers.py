@@ -118,20 +118,13 @@ def settings_for(scenario: Scenario, label: str) -> dict[str, Any]:
     return {**plain, **(own if isinstance(own, Mapping) else {})}
 
 
-def _map_for(scenario: Scenario, control: Control, path: Path) -> dict[str, str]:
-    """Returns the FMU's names by ours: of the file beside it, of [control.map] and of the label."""
-    table = scenario.control_settings
-    own = table.get(control.label, {})
-    parts = (
-        (read_map(path), str(path.with_suffix(".toml"))),
-        (table.get(MAP, {}), f"{scenario.where}: control.map"),
-        (
-            own.get(MAP, {}) if isinstance(own, Mapping) else {},
-            f"{scenario.where}: control.{control.label}.map",
-        ),
-    )
+def _map_for(scenario: Scenario, path: Path) -> dict[str, str]:
+    """Returns the FMU's names by ours: of the file beside it, and of [control.map]."""
     found: dict[str, str] = {}
-    for names, where in parts:
+    for names, where in (
+        (read_map(path), str(path.with_suffix(".toml"))),
+        (scenario.control_settings.get(MAP, {}), f"{scenario.where}: control.map"),
+    ):
         if not isinstance(names, Mapping):
             raise FmuError("wrong type", got=names, expected="a table of names", where=where)
         found |= names_of_map(names, where=where)
@@ -143,9 +136,8 @@ def connection_of(
 ) -> Connection:
     """Returns the connection of a controller FMU with the plant. Raises FmuError."""
     path = control.path or Path(control.name)
-    table = _map_for(scenario, control, path)
     torque = setup.robot.servo.mode == "torque"
-    return connect(variables, table, torque=torque, where=str(path))
+    return connect(variables, _map_for(scenario, path), torque=torque, where=str(path))
 
 
 def fmu_parameters_of(
@@ -154,7 +146,6 @@ def fmu_parameters_of(
     """Returns the parameters of [control] that a controller FMU has."""
     names = {item.name for item in variables if item.causality == "parameter"}
     settings = settings_for(scenario, control.label)
-    settings.pop(MAP, None)
     return {name: value for name, value in settings.items() if name in names}
 
 
@@ -195,8 +186,7 @@ def check_control(scenario: Scenario, controls: Iterable[Control]) -> None:
     _check_taken(plain, list(found.values()), f"{scenario.where}: control")
     for label, own in table.items():
         if label in found and isinstance(own, Mapping):
-            names = [key for key in own if key != MAP]
-            _check_taken(names, [found[label]], f"{scenario.where}: control.{label}")
+            _check_taken(list(own), [found[label]], f"{scenario.where}: control.{label}")
 
 
 def _check_taken(names: Sequence[str], found: Sequence[Taken], where: str) -> None:

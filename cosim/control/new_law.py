@@ -10,7 +10,12 @@ from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.models import HexapodError
 
 TEMPLATE = Path(__file__).parent / "template"
-LAW, TEST, README = "supported_walk.py", "test_of_law.txt", "readme.txt"
+LAW, TEST = "supported_walk.py", "test_of_law.txt"
+README = (
+    "- `{stem}.py`: a controller for `hexapod`; `hexapod compare walk_flat --control kinematic "
+    "--control {stem}.py:{kind}` compares it with kinematic control, `pytest test_{stem}.py` tests "
+    "it.\n"
+)
 NAME = re.compile(r"[^\W\d]\w*")
 
 
@@ -43,7 +48,7 @@ def write_law(name: str, folder: Path) -> list[Path]:
     write_text(test, _filled(TEST, words))
     before = readme.read_text(encoding="utf-8") if readme.is_file() else ""
     gap = "\n" if before and not before.endswith("\n") else ""
-    write_text(readme, f"{before}{gap}{_filled(README, words)}")
+    write_text(readme, f"{before}{gap}{README.format(stem=stem, kind=kind)}")
     return [law, test, readme]
 
 

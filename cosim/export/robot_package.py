@@ -13,7 +13,7 @@ from typing import Any
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.export.platforms import choose_platforms
-from hexapod_cosim.cosim.export.ssp import Experiment, export_ssp
+from hexapod_cosim.cosim.export.ssp import export_ssp
 from hexapod_cosim.cosim.export.start_values import with_starts
 from hexapod_cosim.cosim.interface.controller import (
     ControllerSetup,
@@ -75,8 +75,7 @@ def export_package(
         export_controller(
             setup, files[CONTROLLER], platforms=chosen, fmi=fmi, starts=given[CONTROLLER]
         )
-        experiment = Experiment(step=setup.period, stop=stop)
-        return export_ssp(path, files, title=setup.robot.name, experiment=experiment)
+        return export_ssp(path, files, title=setup.robot.name, step=setup.period, stop=stop)
 
 
 def _refuse_driven(setup: ControllerSetup, values: Values) -> None:

@@ -32,14 +32,6 @@ KINDS = ("input", "output", "parameter")
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Experiment:
-    """Default step size and stop time of the package [s]."""
-
-    step: float
-    stop: float
-
-
 @dataclass(frozen=True)
 class Component:
     """An FMU in the package."""
@@ -80,46 +72,31 @@ def export_ssp(
     fmus: Mapping[str, Path],
     *,
     title: str,
-    experiment: Experiment,
+    step: float,
+    stop: float,
 ) -> Path:
     """Writes a package of FMUs, connected by the names of their variables, and returns its path.
 
     Args:
         path: the file to write, atomically.
-        fmus: files by the names of their components.
+        fmus: files by the names of their components, all of one version of FMI.
         title: of the system.
-        experiment: default step size and stop time.
+        step, stop: default step size and stop time [s].
 
-    Raises FmuError for FMUs without co-simulation, of different versions, and without connections;
-    HexapodError when the path cannot be written.
+    Raises FmuError for FMUs without co-simulation and without connections; HexapodError when the
+    path cannot be written.
     """
     components = [
         Component(name, fmu, read_description(fmu, tuple(VERSIONS))) for name, fmu in fmus.items()
     ]
-    root = structure(components, connect(components), title=title, experiment=experiment)
+    root = structure(components, connect(components), title=title, step=step, stop=stop)
     members = {"SystemStructure.ssd": document_text(root).encode()}
     members |= {f"resources/{one.name}.fmu": one.fmu.read_bytes() for one in components}
     return write_archive(Path(path), members)
 
 
-def _version(components: Sequence[Component]) -> str:
-    """Returns the version of SSP for the FMUs. Raises FmuError for FMUs of different versions."""
-    found = {one.name: str(one.description.fmiVersion) for one in components}
-    if len(set(found.values())) > 1:
-        raise FmuError(
-            "FMUs of different versions in one package",
-            got=", ".join(f"{name}: FMI {version}" for name, version in found.items()),
-            expected="one version",
-            fix="export all of them with the same --fmi",
-        )
-    return VERSIONS[next(iter(found.values()))]
-
-
 def connect(components: Sequence[Component]) -> list[Connection]:
-    """Returns the connections between components.
-
-    Raises FmuError for a component without connections, and for an input with two sources.
-    """
+    """Returns the connections between components. Raises FmuError for one without any."""
     found = [
         Connection(source.name, target.name, name)
         for source in components
@@ -136,14 +113,6 @@ def connect(components: Sequence[Component]) -> list[Connection]:
                 got=f"{component.name}: {component.fmu.name}",
                 expected=expected,
             )
-    driven = [(one.end, one.name) for one in found]
-    twice = next((one for one in driven if driven.count(one) > 1), None)
-    if twice is not None:
-        raise FmuError(
-            "an input with two drivers",
-            got=f"{twice[0]}: {twice[1]}",
-            expected="outputs of different names",
-        )
     return found
 
 
@@ -157,11 +126,12 @@ def structure(
     connections: Iterable[Connection],
     *,
     title: str,
-    experiment: Experiment,
+    step: float,
+    stop: float,
 ) -> Element:
     """Returns the root of SystemStructure.ssd."""
     facts = {
-        "version": _version(components),
+        "version": VERSIONS[components[0].description.fmiVersion],
         "name": title,
         "generationTool": f"{DISTRIBUTION} {package_version()}",
     }
@@ -188,7 +158,7 @@ def structure(
         }
         SubElement(parent, "ssd:Connection", ends)
     _add_units(root, components)
-    _add_experiment(root, experiment)
+    _add_experiment(root, step, stop)
     return root
 
 
@@ -249,16 +219,14 @@ def _add_units(root: Element, components: Iterable[Component]) -> None:
         SubElement(SubElement(parent, "ssc:Unit", name=name), "ssc:BaseUnit", stated)
 
 
-def _add_experiment(root: Element, experiment: Experiment) -> None:
+def _add_experiment(root: Element, step: float, stop: float) -> None:
     """Adds start and stop time, and the step size in an annotation that readers support."""
-    parent = SubElement(
-        root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(experiment.stop)
-    )
+    parent = SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(stop))
     annotation = SubElement(
         SubElement(parent, "ssd:Annotations"), "ssc:Annotation", type="com.opensimulationplatform"
     )
     SubElement(
         SubElement(annotation, "osp:Algorithm"),
         "osp:FixedStepAlgorithm",
-        baseStepSize=repr(experiment.step),
+        baseStepSize=repr(step),
     )

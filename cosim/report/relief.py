@@ -1,4 +1,4 @@
-"""Draws a surface of the ground as a shaded relief with contour lines and the robot for scale."""
+"""Draws the heights of a surface of the ground, with contour lines and the robot for scale."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LightSource, Normalize
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.patches import Circle, Rectangle
 
 from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED
@@ -20,27 +19,22 @@ from hexapod_cosim.models.ground.faces import surface_heights
 from hexapod_cosim.models.ground.surface import Surface
 
 WIDTH = 5.0  # in
-BELOW = -28.0  # pt    of the text below the labels of the x axis
-LIGHT = LightSource(azdeg=315.0, altdeg=40.0)
-EXAGGERATION = 1.5  # of slopes in the shading
 SAMPLES = 4  # drawn per cell and direction of a small map
 MOST_SAMPLES = 400  # along an edge
-STEPS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # m
 CONTOURS = 12  # at most
 
 
 def draw_relief(surface: Surface, robot: Robot, path: Path) -> Path:
-    """Writes the relief as PNG or SVG and returns its path; the robot stands at the origin."""
+    """Writes the heights as PNG or SVG and returns its path; the robot stands at the origin."""
     with matplotlib.rc_context(SETTINGS | {"axes.grid": False}):
         left, right, low, high = surface.extent
         share = min(max((high - low) / (right - left), 0.25), 1.5)
         figure = Figure(figsize=(WIDTH, 0.9 * WIDTH * share + 0.4))
         axes = figure.subplots()
-        scale = draw_surface(axes, surface)
+        picture = draw_surface(axes, surface)
         draw_robot(axes, robot)
         if np.ptp(surface.height) > 0.0:
-            bar = figure.colorbar(scale, ax=axes, shrink=0.8, pad=0.02, label="height [mm]")
-            bar.ax.set_ylim(1e3 * surface.height.min(), 1e3 * surface.height.max())
+            figure.colorbar(picture, ax=axes, shrink=0.8, pad=0.02, label="height [mm]")
         axes.set_xlabel("x [m]")
         axes.set_ylabel("y [m]")
         axes.set_title(surface.name)
@@ -50,51 +44,15 @@ def draw_relief(surface: Surface, robot: Robot, path: Path) -> Path:
     return path
 
 
-def draw_surface(axes: Axes, surface: Surface) -> ScalarMappable:
-    """Draws shading, colour of the height and contour lines; returns the scale of colours [mm]."""
+def draw_surface(axes: Axes, surface: Surface) -> AxesImage:
+    """Draws heights [mm] as colours, and contour lines of smooth ground; returns the picture."""
     x, y, height = sampled(surface)
-    pitch = float(x[1] - x[0]), float(y[1] - y[0])
-    lowest, highest = float(height.min()), float(height.max())
-    span = max(highest - lowest, 1e-6)
-    darkest, brightest = lowest - 0.3 * span, highest + 0.1 * span
-    colours = matplotlib.colormaps["cividis"]
-    plain = colours(Normalize(darkest, brightest)(height))[..., :3]
-    shaded = LIGHT.blend_soft_light(plain, _light(height, pitch)[..., np.newaxis])
-    left, right, low, high = surface.extent
-    axes.imshow(shaded, origin="lower", extent=(left, right, low, high), interpolation="nearest")
-    step = next((step for step in STEPS if span / step <= CONTOURS), STEPS[-1])
-    # half a step off, because level ground at a contour line has no line
-    levels = step * (np.arange(np.floor(lowest / step), np.ceil(highest / step) + 1.0) + 0.5)
-    if surface.kind == "smooth" and highest > lowest:
-        axes.contour(x, y, height, levels=levels, colors="0.15", linewidths=0.4)
-    text = f"{_digits(1e3 * lowest)} to {_digits(1e3 * highest)} mm"
-    text += f", contour lines every {1e3 * step:g} mm" if surface.kind == "smooth" else ", blocks"
-    axes.annotate(
-        text,
-        (0.0, 0.0),
-        xycoords="axes fraction",
-        xytext=(0.0, BELOW),
-        textcoords="offset points",
-        fontsize=6.5,
-        va="top",
+    picture = axes.imshow(
+        1e3 * height, cmap="cividis", origin="lower", extent=surface.extent, interpolation="nearest"
     )
-    return ScalarMappable(Normalize(1e3 * darkest, 1e3 * brightest), colours)
-
-
-def _light(height: Array, pitch: tuple[float, float]) -> Array:
-    """Returns the light (rows, columns) on slopes, from 0 to 1.
-
-    Level ground has 0.5, by which colours keep the values of their scale.
-    """
-    along_y, along_x = np.gradient(EXAGGERATION * height, pitch[1], pitch[0])
-    normals = np.stack([-along_x, -along_y, np.ones_like(height)], axis=-1)
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    return np.asarray(np.clip(0.5 * normals @ LIGHT.direction / LIGHT.direction[2], 0.0, 1.0))
-
-
-def _digits(value: float) -> str:
-    """Returns a value with three digits or more, never as a power of ten."""
-    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
+    if surface.kind == "smooth" and np.ptp(height) > 0.0:
+        axes.contour(x, y, height, levels=CONTOURS, colors="0.15", linewidths=0.4)
+    return picture
 
 
 def sampled(surface: Surface) -> tuple[Array, Array, Array]:

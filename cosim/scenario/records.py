@@ -29,8 +29,7 @@ COMPARED = ("kinematic", "compliant")  # unless a command or a study names its c
 FAULTS = ("dead", "stuck", "nan", "late")  # of sensors
 NOISY = "noisy"  # a further one of force sensors
 ANGLE, ATTITUDE = "angle", "attitude"  # sensors inside the robot
-# of servos; dead and stuck are older names of limp and locked
-SERVO_FAULTS = ("weak", "limp", "locked", "dead", "stuck")
+SERVO_FAULTS = ("weak", "limp", "locked")
 WHOLE_LEG = "all"  # joints
 LOST = ("command", "step")
 DELAY = Number("s", at_least=0.0, at_most=1.0)  # of late readings

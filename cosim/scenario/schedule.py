@@ -29,8 +29,7 @@ from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 ROUND_OFF = 5e-10  # s    of the time of a macro-step
 # weakness and lock
-LIMP, LOCKED = (1.0, 0.0), (0.0, 1.0)
-SERVO_STATES = {"limp": LIMP, "dead": LIMP, "locked": LOCKED, "stuck": LOCKED}
+SERVO_STATES = {"limp": (1.0, 0.0), "locked": (0.0, 1.0)}
 STUCK = FAULTS.index("stuck") + 1  # the kind of a sensor that repeats its last reading
 
 

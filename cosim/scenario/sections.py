@@ -65,8 +65,6 @@ SERVO_TEXTS = {
     "weak": "gives {share:g} of its torque",
     "limp": "is limp",
     "locked": "is locked",
-    "dead": "is limp",
-    "stuck": "is locked",
 }
 
 

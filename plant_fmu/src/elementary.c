@@ -48,18 +48,3 @@ double hx_log1p(double x) {
 }
 
 double hx_pow(double x, double y) { return hx_lanes_pow(x, y); }
-
-/* Three halvings of the angle, tan(half) = y / (x + |(x, y)|), leave |t| <= tan(pi/8); the fourth
- * leaves t <= 0.199, where eleven terms of the series are exact. */
-double hx_half_turn_angle(double y, double x) {
-  static const double c[12] = {-1.0 / 3,  1.0 / 5,  -1.0 / 7,  1.0 / 9,  -1.0 / 11, 1.0 / 13,
-                               -1.0 / 15, 1.0 / 17, -1.0 / 19, 1.0 / 21, -1.0 / 23, 1.0 / 25};
-  const double r = sqrt(x * x + y * y);
-  if (r == 0.0) return 0.0;
-  /* sine and cosine of the half-angle, without cancellation */
-  const double sine = x < 0.0 ? r - x : y;
-  double cosine = x < 0.0 ? y : x + r;
-  for (int halving = 0; halving < 3; ++halving) cosine += sqrt(cosine * cosine + sine * sine);
-  const double t = sine / cosine, w = t * t;
-  return 16.0 * (t + t * w * hx_polynomial(c, 12, w));
-}

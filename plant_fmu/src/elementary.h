@@ -1,4 +1,4 @@
-/* elementary.h - sine, cosine, arc tangent, logarithm and power without libm, whose last bits
+/* elementary.h - sine, cosine, logarithm and power without libm, whose last bits
  * differ between systems and processors */
 #ifndef HX_ELEMENTARY_H
 #define HX_ELEMENTARY_H
@@ -17,10 +17,6 @@ double hx_log1p(double x);
 /* Returns x^y to a few units in the last place, x >= 0 and |y| <= 16. Numbers below the least
  * normal one count as 0; results beyond the range are 0 or infinite. */
 double hx_pow(double x, double y);
-
-/* Returns the angle in [0, pi] with sine y >= 0 and cosine x, which may have a common factor; 0 at
- * the origin. */
-double hx_half_turn_angle(double y, double x);
 
 HX_HIDDEN_END
 

@@ -20,7 +20,7 @@ from hexapod_cosim.models.actuator import GEAR_SPEED
 from hexapod_cosim.models.dynamics import masses
 from hexapod_cosim.models.kinematics import body_states, foot_centres
 
-ROBOTS = ("athena", "phantomx_mk4")
+ROBOTS = ("athena", "phantomx_mk4", "sts3215_hexapod")
 POINT = (
     1e-12,
     1e-12,
@@ -93,9 +93,9 @@ def differences(robot: Robot, motion: Motion, demand: Demand) -> dict[str, float
     below = np.array([motion.way[1].real, motion.way[1].imag, floor])
     moment = needed[3:6] + np.cross(body[0, :3] - below, needed[:3])
     back = np.exp(-1j * motion.yaw[1])
-    torque = needed[6:].reshape(6, 3) + robot.servo.coulomb_friction * np.tanh(
-        motion.speed[1] / GEAR_SPEED
-    )
+    servo, speed = robot.servo, motion.speed[1]
+    gear = servo.coulomb_friction * np.tanh(speed / GEAR_SPEED) + servo.drag * speed
+    torque = needed[6:].reshape(6, 3) + gear
     return {
         "push": abs(demand.push - back * complex(needed[0], needed[1])),
         "weight": abs(demand.weight - needed[2]),

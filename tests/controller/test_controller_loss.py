@@ -16,7 +16,7 @@ from hexapod_cosim.controller.walk.absence import (
     gait_without,
 )
 from hexapod_cosim.controller.walk.kinematics import LegSolver
-from hexapod_cosim.models import load_robot
+from hexapod_cosim.models import Robot, load_robot
 
 H = 0.005  # s    period
 ROBOT = load_robot("athena")
@@ -29,15 +29,20 @@ def mask(*legs: int) -> Mask:
 
 
 def steps_until_faulty(
-    offset: float, *, force: float = 0.0, drift: float = 0.0, most: int = 100
+    offset: float,
+    *,
+    force: float = 0.0,
+    drift: float = 0.0,
+    most: int = 100,
+    robot: Robot = ROBOT,
 ) -> int:
     """Returns the steps until the femur of LF is found faulty, `most` if it is not.
 
     offset: of its command from its angle [rad]; force: on its foot, upwards [N]; drift: of angle
     and command [rad/s].
     """
-    health = Health(ROBOT, make_gains(ROBOT), legs=SOLVER, period=H)
-    command, forces, angle = JointCommand(), np.zeros((LEGS, 3)), ROBOT.stance.copy()
+    health = Health(robot, make_gains(robot), legs=LegSolver(robot), period=H)
+    command, forces, angle = JointCommand(), np.zeros((LEGS, 3)), robot.stance.copy()
     forces[LF, 2] = force
     for step in range(most):
         angle[LF, 1] += drift * H
@@ -73,6 +78,17 @@ def test_a_load_explains_a_torque() -> None:
 def test_a_joint_that_is_as_fast_as_it_can_is_no_fault() -> None:
     """A servo gives no torque at its largest speed, however far the command is ahead."""
     assert steps_until_faulty(0.5, drift=0.9 * ROBOT.servo.speed_max) == 100
+
+
+def test_the_lag_of_a_motor_behind_its_command_is_no_fault() -> None:
+    """At 3 rad/s back-EMF and viscous friction take 3.82 of 6.53 N m, and the angle lags by as much
+    as the firmware needs to ask for that.
+    """
+    robot = load_robot("sts3215_hexapod")
+    assert robot.servo.drag == pytest.approx(1.27404, rel=1e-5)  # 2.17212^2/3.86921 + 0.0546416
+    lag = 3.0 * robot.servo.drag / robot.servo.kp
+    assert steps_until_faulty(lag, drift=3.0, robot=robot) == 100
+    assert steps_until_faulty(lag, robot=robot) == pytest.approx(STRANGE_TIME / H, abs=1)
 
 
 def test_a_servo_is_sound_again_when_it_has_followed_for_some_time() -> None:

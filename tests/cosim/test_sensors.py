@@ -210,16 +210,6 @@ def test_a_noisy_force_sensor_reads_the_force_times_random_numbers_of_the_seed()
 # servos and commands
 
 
-@pytest.mark.parametrize("fault", ["dead", "stuck"])
-def test_the_older_names_of_servo_faults_are_limp_and_locked(fault: str) -> None:
-    event = "events=[{{time=0.015, leg='RM', joint='tibia', fault='{}'}}]"
-    older, newer = (
-        make_schedule(load_scenario("walk_flat", overrides=["duration=0.05", event.format(name)]))
-        for name in (fault, {"dead": "limp", "stuck": "locked"}[fault])
-    )
-    np.testing.assert_array_equal(older.servos, newer.servos)
-
-
 def test_a_kinematic_drive_has_no_faulty_servo() -> None:
     limp = "events=[{time=0.1, leg='RM', joint='tibia', fault='limp'}]"
     scenario = load_scenario("walk_flat", overrides=[limp, "servo.mode=kinematic"])
@@ -274,7 +264,7 @@ def test_events_are_described_in_order_and_survive_a_scenario_file() -> None:
         "{time=1.1, sensor='angle', leg='LM', joint='coxa', fault='stuck'}, "
         "{time=1.2, sensor='attitude', fault='dead'}, "
         "{time=1.3, leg='LM', fault='late', delay='20 ms', duration=2}, "
-        "{time=2, leg='RF', joint='coxa', fault='dead', duration=0.5}, "
+        "{time=2, leg='RF', joint='coxa', fault='limp', duration=0.5}, "
         "{time=2.5, duration=0.1, force=[0, 40, 0]}, "
         "{time=2.6, duration=0.1, lost='command'}, {time=3.5, leg='LM', fault='stuck'}"
     )

@@ -50,6 +50,22 @@ def test_a_robot_walks_for_a_minute_at_the_commanded_speed_without_falling(
     assert forward / 58.0 == pytest.approx(COMMANDED, rel=SHARE)
 
 
+@pytest.mark.usefixtures("plant_build")
+@pytest.mark.parametrize(("control", "most"), [("paper", 0.15), ("compliant", 0.22)])
+def test_a_hexapod_with_measured_servos_slips_less_than_without_control(
+    control: str, most: float
+) -> None:
+    """Its feet slip by 0.25 m/m under kinematic control; no servo is taken for a faulty one."""
+    sets = ["robot=sts3215_hexapod", f"control={control}", "duration=5"]
+    with Runner(everything=True) as runner:
+        result = runner.simulate(load_scenario("walk_flat", overrides=sets))
+    assert result.completed
+    assert result.metrics["slip_per_metre"] < most
+    assert not result.outcome.recording.columns(
+        [f"controller.{leg}.absent" for leg in LEG_NAMES]
+    ).any()
+
+
 def swaying(robot: Robot, ahead: float) -> NDArray[np.void]:
     """Returns joint commands that turn and lift the torso once per period, as input for fmpy.
 

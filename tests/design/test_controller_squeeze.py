@@ -11,8 +11,8 @@ import pytest
 from gains import PERIOD, make_gains
 
 from hexapod_cosim.controller import LegSolver, make_gait
+from hexapod_cosim.controller.comply.load_plan import Shares
 from hexapod_cosim.controller.comply.planned_squeeze import MOST_FRICTION, PlannedSqueeze
-from hexapod_cosim.controller.comply.shares import Shares
 from hexapod_cosim.controller.comply.support import Support
 from hexapod_cosim.controller.plane import Array, Plane, across
 from hexapod_cosim.controller.sense.load_adaptation import (

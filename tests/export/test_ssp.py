@@ -14,23 +14,18 @@ from fmpy.ssp.ssd import read_ssd
 
 from hexapod_cosim.cosim.cli.simulating import read_package
 from hexapod_cosim.cosim.common.plant_files import fmi2_platform
-from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.export.ssp import (
     KINDS,
     PREFIXES,
-    Component,
-    Experiment,
     export_ssp,
-    structure,
 )
-from hexapod_cosim.cosim.interface.descriptions import open_description, read_description
-from hexapod_cosim.models import load_robot
+from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.models.errors import FmuError, HexapodError
 from tools.importers.package import run
 
 STEP, STEPS = 0.005, 60  # s
 SWING = 0.05  # rad    start value of the controller
-EXPERIMENT = Experiment(step=STEP, stop=0.3)
+STOP = 0.3  # s
 ORDER = ("plant", "controller")
 SEEN = (f"plant.{JOINT}.angle", f"controller.{JOINT}.angle_ref", "plant.torso.position[3]")
 
@@ -46,7 +41,7 @@ def fmus(athena_fmu: Path, controller: Path) -> dict[str, Path]:
 
 
 def pack(folder: Path, fmus: dict[str, Path]) -> Path:
-    return export_ssp(folder / "athena.ssp", fmus, title="athena", experiment=EXPERIMENT)
+    return export_ssp(folder / "athena.ssp", fmus, title="athena", step=STEP, stop=STOP)
 
 
 @pytest.fixture(scope="module")
@@ -132,28 +127,10 @@ def test_components_that_share_no_names_are_refused(controller: Path, tmp_path: 
             tmp_path / "no.ssp",
             {"one": controller, "other": controller},
             title="no",
-            experiment=EXPERIMENT,
+            step=STEP,
+            stop=STOP,
         )
     assert not list(tmp_path.iterdir())
-
-
-def test_an_input_with_two_drivers_is_refused(fmus: dict[str, Path], tmp_path: Path) -> None:
-    with pytest.raises(FmuError, match="two drivers"):
-        pack(tmp_path, fmus | {"second": fmus["controller"]})
-
-
-def test_fmus_of_different_versions_are_refused(fmus: dict[str, Path], tmp_path: Path) -> None:
-    newer = export_fmu(load_robot("athena"), tmp_path / "plant.fmu", fmi=3)
-    with pytest.raises(FmuError, match="different versions"):
-        structure(
-            [
-                Component("one", newer, open_description(newer)),
-                Component("two", fmus["plant"], open_description(fmus["plant"])),
-            ],
-            [],
-            title="no",
-            experiment=EXPERIMENT,
-        )
 
 
 def test_a_package_is_read_as_fmus_and_settings_of_a_run(

@@ -100,7 +100,7 @@ def test_a_foot_deeper_than_its_radius_at_the_start_is_refused_with_its_depth(
     plant = on_grid(core, ATHENA, ground, position=(0.0, 0.0, 1.0))
     above = float(np.min(np.array(plant.output().foot.position)[:, 2]))  # lowest points
     before = plant.save()
-    refused = r"got foot .. 0\.02 m deep .* at most 0\.015 m, its radius; raise .* by 0\.005 m"
+    refused = r"got foot .. 0\.02 m deep .* at most 0\.015 m; raise .* by 0\.005 m"
     with pytest.raises(PlantError, match=refused):
         start_on_grid(plant, ground, position=(0.0, 0.0, 1.0 - above - 0.02))
     assert plant.save() == before

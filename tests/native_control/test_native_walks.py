@@ -39,6 +39,7 @@ WALKS = [
     ("athena", "wave", True),
     ("phantomx_mk4", "amble", True),
     ("phantomx_mk4", "wave", False),
+    ("sts3215_hexapod", "tripod", True),
 ]
 
 

@@ -163,8 +163,8 @@ def test_a_foot_deeper_than_its_radius_at_the_start_is_refused_with_its_name(
     start = definition(plant.robot, position=(0.0, 0.0, height + 0.0049), angle=stance)
     start.terrain.height = 0.025
     message = (
-        r"initial\.position: got foot .. 0\.0351 m deep in the ground, expected at most 0\.015 m, "
-        r"its radius; raise initial\.position\[3\] by 0\.0201 m or more, or lower "
+        r"initial\.position: got foot .. 0\.0351 m deep in the ground, expected at most 0\.015 m; "
+        r"raise initial\.position\[3\] by 0\.0201 m or more, or lower "
         r"terrain\.height$"
     )
     refused(plant, lambda: plant.reset(start), INVALID_MODEL, message)

@@ -322,7 +322,7 @@ def test_a_folder_of_an_extension_that_is_not_installed_is_named(
     write_json(tmp_path / "run.json", {"kind": "dance", "status": "completed"})
     code, _, err = call("report", tmp_path)
     assert code == 1
-    assert "install the extension with the command dance" in " ".join(err.split())
+    assert "install the extension that wrote it" in " ".join(err.split())
 
 
 def test_a_report_is_made_again_from_gains_that_json_cannot_hold(

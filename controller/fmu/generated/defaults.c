@@ -308,6 +308,7 @@ static const hxControllerDefinition default_definition = {
     .parts.squeeze = 0.3,
     .friction = 0.7,
     .servo.torque_continuous = 1.2,
+    .servo.drag = 0.0,
 };
 
 void hx_controller_definition_default(hxControllerDefinition *definition) {
@@ -675,6 +676,7 @@ static const hxRange definition_ranges[] = {
     {"parts.squeeze", "", 0.0, 0.99, offsetof(hxControllerDefinition, parts.squeeze), 0},
     {"friction.mu", "", 0.0, 100.0, offsetof(hxControllerDefinition, friction), 0},
     {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(hxControllerDefinition, servo.torque_continuous), 0},
+    {"servo.drag", "N.m.s/rad", 0.0, 1000000.0, offsetof(hxControllerDefinition, servo.drag), 0},
 };
 
 size_t hx_controller_definition_ranges(const hxRange **range) {

@@ -169,14 +169,6 @@ static inline hxReal hx_stored_energy(const hxSoils *soil, hxReal plastic, hxRea
 
 /* ---- shear ---- */
 
-/* Returns the half-turn angles of a pack. */
-static inline hxReal half_turn_angles(hxReal y, hxReal x) {
-  hxNumber a[HX_LANES], b[HX_LANES];
-  hx_store(a, y), hx_store(b, x);
-  for (int lane = 0; lane < HX_LANES; ++lane) a[lane] = hx_half_turn(a[lane], b[lane]);
-  return hx_load(a);
-}
-
 /* Returns the integral of depth over the foot's profile, m3. */
 static inline hxReal profile_moment(const hxSoils *soil, hxReal z) {
   const hxReal R = soil->radius, c = R - z;
@@ -184,7 +176,11 @@ static inline hxReal profile_moment(const hxSoils *soil, hxReal z) {
   const hxReal full = hx_select(pad, R * z * z, pi * R * R * (z - R));
   if (!hx_any(part)) return full;
   const hxReal chord = hx_sqrt((R - c) * (R + c));
-  const hxReal segment = R * R * half_turn_angles(chord, c) - c * chord;
+  /* the angle in [0, pi] with the sine chord/R and the cosine c/R, from its half */
+  const hxMask above = hx_less(c, hx_splat(0.0));
+  const hxReal angle =
+      hx_angle_from_half(hx_select(above, R - c, chord), hx_select(above, chord, R + c));
+  const hxReal segment = R * R * angle - c * chord;
   return hx_select(part, (2.0 / 3.0) * (chord * chord * chord) - c * segment, full);
 }
 

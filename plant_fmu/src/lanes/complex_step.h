@@ -81,9 +81,6 @@ static inline hxNumber hx_asin(hxNumber x) {
   return hx_chain(x, asin(s), cosine > 0.0 ? 1.0 / cosine : 0.0);
 }
 
-/* Returns the angle in [0, pi] with sine y and cosine x, as hx_half_turn_angle does. */
-static inline hxNumber hx_half_turn(hxNumber y, hxNumber x) { return hx_atan2(y, x); }
-
 static inline hxReal hx_lanes_pow(hxReal x, hxReal y) {
   const double power = hx_pow(hx_re(x), hx_re(y));
   return hx_chain(x, power, hx_re(x) > 0.0 ? hx_re(y) * power / hx_re(x) : 0.0);

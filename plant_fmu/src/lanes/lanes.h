@@ -220,8 +220,6 @@ static inline double hx_asin(double x) {
   return hx_atan2(x, sqrt(fmax(0.0, (1.0 - x) * (1.0 + x))));
 }
 
-static inline double hx_half_turn(double y, double x) { return hx_half_turn_angle(y, x); }
-
 /* Computes sine and cosine of each lane with hx_sin_cos. */
 static inline void hx_lanes_sin_cos(hxReal x, hxReal *sine, hxReal *cosine) {
   double s[HX_LANES], c[HX_LANES];

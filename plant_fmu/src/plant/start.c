@@ -33,55 +33,36 @@ hxStatus hx_plant_check_terrain(hxPlant *plant, const hxDefinition *d, char *mes
   return HX_INVALID_MODEL;
 }
 
-/* A sphere that starts in the ground. */
-typedef struct {
-  int row, slot;
-  double depth, bound; /* m  of its lowest point, largest one that is accepted */
-} hxSunk;
-
-/* Returns how deep a sphere is in the ground, and how deep it may be: its radius, where its centre
- * reaches the surface. Points have the bound of feet, because the force that the law has at a depth
- * is the same. */
-static hxSunk sunk(const hxModel *model, const hxDepths *depths, int row, int slot) {
-  const double radius = model->radius[row] > 0.0 ? model->radius[row] : model->radius[HX_FOOT];
-  return (hxSunk){row, slot, depths->delta[row][slot], radius};
-}
-
-/* Writes the name of a sphere. */
-static void name_sphere(const hxSunk *sphere, char name[32]) {
-  static const char *row[] = {[HX_FOOT] = "foot", [HX_KNEE] = "knee", [HX_SHANK] = "shank"};
-  const int slot = sphere->slot;
-  if (sphere->row == HX_TORSO)
-    hx_print(name, 32, "torso corner (%s%s%s)", slot & 1 ? "+x" : "-x", slot & 2 ? " +y" : " -y",
-             slot & 4 ? " +z" : " -z");
-  else
-    hx_print(name, 32, "%s %s", row[sphere->row], hx_leg_name(slot));
+/* Returns how deep a sphere may be in the ground, m: its radius, where its centre reaches the
+ * surface. Points have the bound of feet, because the force that the law has at a depth is the
+ * same. */
+static double deepest_start(const hxModel *model, int row) {
+  return model->radius[row] > 0.0 ? model->radius[row] : model->radius[HX_FOOT];
 }
 
 /* Fails if a foot, a knee, a shank or a corner of the torso starts deeper in rigid ground than it
  * may: the contact law does not hold at such depths, and its force would throw the robot up. */
 static hxStatus check_start_depth(const hxPlant *plant, const hxDepths *depths,
                                   char message[HX_MESSAGE_SIZE]) {
+  static const char *const part[] = {
+      [HX_FOOT] = "foot", [HX_KNEE] = "knee", [HX_SHANK] = "shank", [HX_TORSO] = "torso"};
   const hxModel *model = &plant->model;
   const hxContactState *contact = &plant->state.contact;
-  hxSunk worst = {0};
-  char name[32];
+  int worst_row = HX_FOOT, worst_slot = 0;
+  double excess = 0.0; /* m */
   for (int k = 0; k < model->listed; ++k)
-    for (int slot = 0; slot < hx_slots_of(model->row[k]); ++slot) {
-      const int row = model->row[k];
-      if (hx_is_wall(row) || hx_is_of_pair(row)) continue;
-      const hxSunk sphere = sunk(model, depths, row, slot);
-      if (!(row == HX_FOOT && contact->on_soil[slot] != 0.0) &&
-          sphere.depth - sphere.bound > worst.depth - worst.bound)
-        worst = sphere;
+    for (int row = model->row[k], slot = 0; slot < hx_slots_of(row); ++slot) {
+      const double over = depths->delta[row][slot] - deepest_start(model, row);
+      const int is_soft = row == HX_FOOT && contact->on_soil[slot] != 0.0;
+      if (hx_is_wall(row) || hx_is_of_pair(row) || is_soft || !(over > excess)) continue;
+      worst_row = row, worst_slot = slot, excess = over;
     }
-  if (!(worst.depth > worst.bound)) return HX_OK;
-  name_sphere(&worst, name);
-  const char *reason = model->radius[worst.row] > 0.0 ? "its radius" : "the radius of a foot";
+  if (!(excess > 0.0)) return HX_OK;
   hx_print(message, HX_MESSAGE_SIZE,
-           "initial.position: got %s %.4g m deep in the ground, expected at most %.4g m, %s; raise "
+           "initial.position: got %s %s %.4g m deep in the ground, expected at most %.4g m; raise "
            "initial.position[3] by %.4g m or more, or lower terrain.height",
-           name, worst.depth, worst.bound, reason, worst.depth - worst.bound);
+           part[worst_row], worst_row == HX_TORSO ? "corner" : hx_leg_name(worst_slot),
+           depths->delta[worst_row][worst_slot], deepest_start(model, worst_row), excess);
   return HX_INVALID_MODEL;
 }
 

@@ -50,9 +50,8 @@ HX_API void hx_probe_elementary(const double *x, double *sine, double *cosine, d
   }
 }
 
-HX_API void hx_probe_power(const double *x, const double *y, double *power, double *angle, int n) {
-  for (int i = 0; i < n; ++i)
-    power[i] = hx_pow(fabs(x[i]), y[i]), angle[i] = hx_half_turn_angle(fabs(y[i]), x[i]);
+HX_API void hx_probe_power(const double *x, const double *y, double *power, int n) {
+  for (int i = 0; i < n; ++i) power[i] = hx_pow(fabs(x[i]), y[i]);
 }
 
 /* ---- soil ---- */

@@ -5,7 +5,7 @@
 
 #include "../plane.h"
 #include "../walk/kinematics.h"
-#include "shares.h"
+#include "load_plan.h"
 
 typedef struct hxPaperModel {
   double period;              /* s */

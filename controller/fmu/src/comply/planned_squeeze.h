@@ -3,7 +3,7 @@
 #ifndef HX_PLANNED_SQUEEZE_H
 #define HX_PLANNED_SQUEEZE_H
 
-#include "shares.h"
+#include "load_plan.h"
 
 typedef struct hxPlannedSqueeze {
   double friction; /* 1, coefficient that is believed */

@@ -4,7 +4,7 @@
 #define HX_SUPPORT_H
 
 #include "../walk/inverse_dynamics.h"
-#include "shares.h"
+#include "load_plan.h"
 #include <string.h>
 
 typedef struct hxSupport {

@@ -7,6 +7,7 @@
 
 typedef struct hxHealthModel {
   double stiffness; /* N m/rad  of the servos */
+  double drag;      /* N m s/rad  that the speed takes from their torque */
   double most;      /* N m, largest torque */
   double period;    /* s */
 } hxHealthModel;
@@ -31,6 +32,7 @@ static const double proof_time = 1.2;
 static inline void hx_health_compile(const hxControllerDefinition *definition,
                                      hxHealthModel *model) {
   model->stiffness = definition->servo.kp;
+  model->drag = definition->servo.drag;
   model->most = definition->gains.limits.torque;
   model->period = definition->period;
 }
@@ -40,9 +42,9 @@ static inline void hx_health_compile(const hxControllerDefinition *definition,
 static inline double unexplained(const hxHealthModel *model, double speed_max, double before,
                                  double angle, double angle_ref, double speed_ref,
                                  double torque_ref, double load) {
-  const double pace = (angle - before) / (model->period * speed_max),
+  const double speed = (angle - before) / model->period, pace = speed / speed_max,
                reached = angle_ref + model->period * speed_ref,
-               torque = model->stiffness * (reached - angle) + torque_ref,
+               torque = model->stiffness * (reached - angle) + torque_ref - model->drag * speed,
                low = -model->most * hx_clamp(1.0 + pace, 0.0, 1.0),
                high = model->most * hx_clamp(1.0 - pace, 0.0, 1.0);
   return (hx_clamp(torque, low, high) - load) / model->most;

@@ -10,6 +10,7 @@
 typedef struct hxInverseDynamics {
   double period, gravity; /* s, m/s2 */
   double rotor, friction; /* kg m2, N m  of servo and gear */
+  double drag;            /* N m s/rad  that a joint's speed takes from its servo */
   double floor;           /* m, height of the ground below the stance, torso frame */
   double torso_mass, torso_inertia;
   double total_mass; /* kg, of torso and links */
@@ -64,6 +65,7 @@ static inline void hx_inverse_dynamics_compile(const hxControllerDefinition *def
   model->gravity = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
   model->rotor = definition->servo.rotor_inertia;
   model->friction = definition->servo.coulomb_friction;
+  model->drag = definition->servo.drag;
   model->torso_mass = model->total_mass = definition->torso.mass;
   model->torso_inertia = definition->torso.inertia_zz;
   model->torso_com = hx_plane(definition->torso.com[0], definition->torso.com[1]);
@@ -189,11 +191,11 @@ static inline void demand_links(const hxInverseDynamics *model, const hxNeighbou
 }
 
 /* Computes the joint torques of a leg (C15) from the forces on its links, torso frame. rubs: share
- * of the gears' dry friction that acts. */
+ * of the gears' dry friction that acts; speed: of the joints [rad/s]. */
 static inline void demand_torques(const hxInverseDynamics *model, const hxLegSolver *leg,
                                   const hxNeighbours *motion, int k, const hxPlane push[HX_JOINTS],
                                   const double lift[HX_JOINTS], const double rubs[HX_JOINTS],
-                                  double torque[HX_JOINTS]) {
+                                  const double speed[HX_JOINTS], double torque[HX_JOINTS]) {
   const hxPose *now = &motion->pose[1][k];
   const hxPlane *point = motion->masses[1]->point[k],
                 joint = hx_plane(leg->coxa_length, leg->coxa_height);
@@ -202,7 +204,7 @@ static inline void demand_torques(const hxInverseDynamics *model, const hxLegSol
     if (motion->pose[0] && motion->pose[2])
       turning[i] = acceleration(motion->pose[0][k].angle[i], now->angle[i],
                                 motion->pose[2][k].angle[i], model->period);
-    torque[i] = model->rotor * turning[i] + model->friction * rubs[i];
+    torque[i] = model->rotor * turning[i] + model->friction * rubs[i] + model->drag * speed[i];
   }
   hxPlane inner[HX_JOINTS];
   for (int i = 0; i < HX_JOINTS; ++i) {
@@ -253,7 +255,8 @@ hx_inverse_dynamics_demand(const hxInverseDynamics *model, const hxLegSolver leg
   hx_saturations(HX_LEGS * HX_JOINTS, rubs, rubs);
   for (int k = 0; k < HX_LEGS; ++k) {
     demand_links(model, motion, k, posture, laden, push, lift, demand);
-    demand_torques(model, &leg[k], motion, k, push, lift, &rubs[k * HX_JOINTS], demand->torque[k]);
+    demand_torques(model, &leg[k], motion, k, push, lift, &rubs[k * HX_JOINTS], speed[k],
+                   demand->torque[k]);
     lever_of(&leg[k], &motion->pose[1][k], posture, demand->lever[k]);
   }
   demand_torso(model, motion, laden, demand);

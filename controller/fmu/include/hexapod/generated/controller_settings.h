@@ -195,6 +195,9 @@ typedef struct hxControllerDefinition {
     /* N.m  Torque that a servo can give for ever; the planned squeeze grows as its mean square
      * nears the square of it */
     double torque_continuous;
+    /* N.m.s/rad  Torque that the joint's speed takes from a command: back-EMF and viscous friction
+     * */
+    double drag;
   } servo;
   /* m/s2  Acceleration of free fall, world axes */
   double gravity[3];
