@@ -20,6 +20,7 @@ from hexapod_cosim.cosim.interface.controller import (
     load_controller_interface,
 )
 from hexapod_cosim.cosim.interface.plant import load_interface
+from hexapod_cosim.cosim.scenario.records import GRAVITY_NAMES
 from hexapod_cosim.models import FmuError, HexapodError, unknown_name
 
 PLANT, CONTROLLER = "plant", "controller"  # in the order of calculation
@@ -94,6 +95,15 @@ def read_values(texts: Iterable[str]) -> dict[str, dict[str, float]]:
         component, _, variable = name.partition(".")
         if component not in {PLANT, CONTROLLER}:
             raise unknown_name("component", component, (PLANT, CONTROLLER), where=f"--set {text}")
+        if variable in GRAVITY_NAMES:
+            raise HexapodError(
+                "gravity of one component alone",
+                got=name,
+                expected="the same for both",
+                fix="write gravity = [0, 0, -1.62] into the robot's file: gains and the standing "
+                "pose follow from it",
+                where=f"--set {text}",
+            )
         try:
             found.setdefault(component, {})[variable] = float(number)
         except ValueError as error:
