@@ -130,9 +130,12 @@ class Controller(Stateful):
 
     def _watch(self, measurement: Measurement) -> None:
         """Takes legs that are lost out of service, before the present step is planned (C57)."""
-        health = self.health
-        health.step(measurement.angle, sense(measurement, LEVEL), self._out)
-        if self.plan.lose(health.lost, self._out):
+        health, plan = self.health, self.plan
+        force = sense(measurement, LEVEL)
+        # a foot that its leg lifts bears no load: a stuck sensor must not make the servos strange
+        force[plan.paths.clock.swinging & (plan.now.feet.rise > 0.0)] = 0.0
+        health.step(measurement.angle, force, self._out)
+        if plan.lose(health.lost, self._out):
             self._change()
 
     def _fold(self, measurement: Measurement) -> None:

@@ -245,7 +245,7 @@ static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegS
       output->torque_ref[k][joint] = laws->torque[k][joint];
     }
     if (busy || compliant->moving) compliant->offset[k] = offset;
-    output->fallback[k] = laws->fallback[k];
+    output->fallback[k] = laws->fallback;
     output->shift[k][0] = output->shift[k][1] = 0.0;
     output->lift[k] = raised;
   }

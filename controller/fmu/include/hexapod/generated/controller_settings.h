@@ -157,7 +157,7 @@ typedef struct hxParts {
   int path;
   /* 0 or 1  Part of the compliant control: torques are limited */
   int limits;
-  /* 0 or 1  Part of the compliant control: no feedback from a sensor that contradicts the plan;
+  /* 0 or 1  Part of the compliant control: a sensor that contradicts the plan is replaced;
    * kinematic control while the robot slides or outruns its joints */
   int fallback;
   /* 1  Weight of the servos' torques against the feet's use of friction in the planned squeeze of
@@ -242,8 +242,7 @@ typedef struct hxControllerOutput {
   int swinging[6];
   /* 0 or 1  The leg's joints cannot follow the foot's path */
   int unreachable[6];
-  /* 0 or 1  The leg walks without feedback: its sensor is not believed, or the robot slides or
-   * outruns its joints */
+  /* 0 or 1  The leg walks without feedback: the robot slides or outruns its joints */
   int fallback[6];
   /* m  Horizontal correction of the foot by the compliance, walking frame */
   double shift[6][2];
