@@ -8,6 +8,7 @@ import json
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -146,18 +147,20 @@ def test_the_centre_of_mass_of_a_link_stays_along_it() -> None:
 
 def with_zeros(robot: Robot, zeros: Array) -> Robot:
     """Returns the same robot with other poses at angle 0. zeros: the angles there (6, 3) [rad]."""
-    legs = []
+    legs: list[Any] = []
     for leg, own in zip(robot.legs, zeros.tolist(), strict=True):
-        turn, links = np.eye(3), []
+        turn = np.eye(3)
+        links: Any = []
         for link, zero in zip(leg.links, own, strict=True):
             axis = turn @ link.axis
             turn = turn @ axis_rotation(np.array(link.axis), zero)
             length, y, z = (turn @ link.tip).tolist()
-            inertia = turn @ inertia_matrix(link.inertia) @ turn.T
+            own_inertia = turn @ inertia_matrix(link.inertia) @ turn.T
+            inertia: Any = tuple(inertia_entries(own_inertia))
             links.append(
                 replace(
                     link, axis=tuple(axis.tolist()), length=length, offset_y=y, offset_z=z,
-                    com=tuple((turn @ link.com).tolist()), inertia=tuple(inertia_entries(inertia)),
+                    com=tuple((turn @ link.com).tolist()), inertia=inertia,
                     angle_min=link.angle_min - zero, angle_max=link.angle_max - zero,
                 )
             )  # fmt: skip

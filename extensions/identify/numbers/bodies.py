@@ -51,7 +51,7 @@ def com_row(axis: int, prior: float) -> Unknown:
     def write(robot: Robot, value: float) -> Robot:
         com = list(robot.torso.com)
         com[axis] = value
-        return replace(robot, torso=replace(robot.torso, com=tuple(com)))
+        return replace(robot, torso=replace(robot.torso, com=(com[0], com[1], com[2])))
 
     return Unknown(
         key=f"torso.com[{axis + 1}]", unit="m", group="mass", prior=prior, positive=False,
