@@ -106,7 +106,7 @@ def identify(
     words += [word for name in find or [] for word in ("--find", name)]
     words += ["--friction", friction] if friction else []
     words += ["--held-out", str(held_out)] if held_out != HELD_OUT else []
-    recorded = [read_log(path, torso_com=own.torso.com) for path in logs]
+    recorded = [read_log(path, robot=own) for path in logs]
     with results_folder(output or Path("out") / "identify", own=results.FILES) as folder:
         found = identification.identify(
             recorded,
