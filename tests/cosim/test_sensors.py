@@ -1,6 +1,6 @@
 """Errors of sensors and servos, and lost commands, on a plant whose true values are known.
 
-Both loops call the same functions in C; test_walker.py compares whole walks of both loops.
+Both loops call the same functions in C; test_runner.py compares whole walks of both loops.
 """
 
 from __future__ import annotations
