@@ -15,8 +15,8 @@ import pytest
 from command import Call, assert_refused
 from secret_robots import NOISE, Secret, secret_robot, with_column
 
-from benchmarks.identification import GOAL_COVERED, GOAL_RATIO, summary, table_row
-from benchmarks.identification import score as score_of
+from benchmarks.identify.robots import GOAL_COVERED, GOAL_RATIO, summary, table_row
+from benchmarks.identify.robots import score as score_of
 from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
 from hexapod_cosim.extensions.identify.experiment import of_point
 from hexapod_cosim.extensions.identify.fitting.misfit import misfits, read_noise

@@ -1,7 +1,7 @@
 """Identifies robots with secret numbers from their logs: are the intervals right, and how much
 nearer does the identified robot come?
 
-usage: PYTHONPATH=tests/identify python -m benchmarks.identification [--robots 20] [--seconds 6]
+usage: PYTHONPATH=tests/identify python -m benchmarks.identify.robots [--robots 20] [--seconds 6]
        [--workers 1] [--table FILE.csv]
 
 Each robot is drawn as the table of unknowns says of what is known beforehand, walks on the plant
