@@ -93,7 +93,7 @@ def identify(
     own = load_robot(robot)
     if friction is not None:
         own = with_friction_model(own, friction)
-    recorded = [read_log(path, torso_com=own.torso.com) for path in logs]
+    recorded = [read_log(path, robot=own) for path in logs]
     with results_folder(output or Path("out") / "identify", own=results.FILES) as folder:
         found = identification.identify(
             recorded,

@@ -190,17 +190,6 @@ def test_numbers_of_bodies_do_not_depend_on_the_zeros_of_the_joints(seed: int) -
     assert back.inertia == pytest.approx(expected.inertia, abs=1e-14)
 
 
-def test_a_link_without_length_keeps_its_centre_of_mass() -> None:
-    robot = load_robot("athena")
-    legs = [
-        replace(leg, links=(replace(leg.links[0], length=0.0), *leg.links[1:]))
-        for leg in robot.legs
-    ]
-    rows = chosen_unknowns(replace(robot, legs=tuple(legs)), [], ("mass",))
-    along = [row.key for row in rows if row.key.endswith("along")]
-    assert along == ["links.femur.com_along", "links.tibia.com_along"]
-
-
 def test_a_channel_that_the_model_does_not_explain_is_named(
     secrets: list[Secret], found: list[Identified]
 ) -> None:
