@@ -19,12 +19,16 @@ static int is_inertia(const double I[6]) {
          p[2] >= 0.0 && minor >= 0.0 && det >= 0.0;
 }
 
-/* Fails for an impossible inertia. */
-static void check_inertia(hxChecker *c, const char *name, const double inertia[6]) {
-  if (!is_inertia(inertia))
-    hx_check_fail(c, name, inertia[0],
-                  "an inertia that a body can have: positive, each principal moment at most the "
-                  "sum of the others");
+/* Fails for an impossible inertia I of a body; names its largest moment. */
+static void check_inertia(hxChecker *c, const char *body, const double I[6]) {
+  static const char *const moment[] = {"inertia_xx", "inertia_yy", "inertia_zz"};
+  const int yz = I[2] > I[1] ? 2 : 1, largest = I[yz] > I[0] ? yz : 0;
+  char name[32];
+  if (is_inertia(I)) return;
+  hx_print(name, sizeof name, "%s%s", body, moment[largest]);
+  hx_check_fail(c, name, I[largest],
+                "an inertia that a body can have: positive, each principal moment at most the "
+                "sum of the others");
 }
 
 /* Fails for a vector of n numbers without length. */
@@ -42,7 +46,7 @@ static void check_legs(hxChecker *c, const hxDefinition *d) {
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const hxLink *link = &d->leg[leg].link[joint];
       const double tip[3] = {link->length, link->offset_y, link->offset_z};
-      hx_joint_label(leg, joint, "inertia_xx", name);
+      hx_joint_label(leg, joint, "", name);
       check_inertia(c, name, link->inertia);
       hx_joint_label(leg, joint, "axis", name);
       check_not_zero(c, name, link->axis, 3, "a direction: not all zero");
@@ -110,7 +114,7 @@ static void check_rotors(hxChecker *c, const hxDefinition *d) {
 
 /* Checks conditions between several numbers that are within their ranges. */
 static void check_relations(hxChecker *c, const hxDefinition *d) {
-  check_inertia(c, "torso.inertia_xx", d->torso.inertia);
+  check_inertia(c, "torso.", d->torso.inertia);
   check_legs(c, d);
   check_servo(c, d);
   if (c->status == HX_OK) check_rotors(c, d);
