@@ -67,7 +67,7 @@ def test_numbers_of_secret_robots_lie_within_their_intervals(
     """The campaign of 20 robots and all numbers is `make identify-campaign`."""
     scores = [score_of(*pair, 0.0) for pair in zip(secrets, found, strict=True)]
     figures = summary([table_row(k, one, DURATION) for k, one in enumerate(scores)])
-    assert figures["told"] == 16
+    assert figures["determined"] == 16
     assert figures["covered"] >= GOAL_COVERED
     for one in scores:  # a second of walking shows little of the position
         assert one.ratios["torque"] > GOAL_RATIO
