@@ -62,10 +62,9 @@ def com_row(axis: int, prior: float) -> Unknown:
 def along_row(joint: int, prior: float) -> Unknown:
     """Returns the row of how far a centre of mass lies along its link; all legs move alike.
 
-    The direction is that from the joint to the next one (the foot), wherever the angle 0 is. A
-    link without length has no such row. The centre lies between the two joints or PAST of the
-    length beyond either, because housings of servos stick out. What the robot file says is always
-    possible.
+    The direction is that from the joint to the next one (the foot), wherever the angle 0 is. The
+    centre lies between the two joints or PAST of the length beyond either, because housings of
+    servos stick out. What the robot file says is always possible.
     """
 
     def read(robot: Robot) -> float:
@@ -81,19 +80,14 @@ def along_row(joint: int, prior: float) -> Unknown:
         return _with_bodies(robot, joint, moved)
 
     def limits(robot: Robot) -> tuple[float, float]:
-        longest, own = max(_lengths(robot, joint)), read(robot)
+        longest = max(math.hypot(*leg.links[joint].tip) for leg in robot.legs)  # m
+        own = read(robot)
         return min(-PAST * longest, own), max((1.0 + PAST) * longest, own)
 
     return Unknown(
         key=f"{_name(joint)}.com_along", unit="m", group="mass", prior=prior, positive=False,
         read=read, write=write, limits_of=limits,
-        applies=lambda robot: min(_lengths(robot, joint)) > 0.0,
     )  # fmt: skip
-
-
-def _lengths(robot: Robot, joint: int) -> list[float]:
-    """Returns the distances [m] between a joint of all legs and the next one."""
-    return [math.hypot(*leg.links[joint].tip) for leg in robot.legs]
 
 
 def _direction(link: Link) -> NDArray[np.float64]:
