@@ -143,11 +143,12 @@ def export_interface(
     fmi: int = 2,
     platforms: Iterable[str] | None = None,
     grids: Mapping[str, bytes] = NOTHING,
+    packed: Mapping[str, bytes] = NOTHING,
     bare: bool = False,
 ) -> Path:
     """Writes the FMU of a component with this interface; arguments and errors as `export_fmu`.
 
-    grids: grid files by their path in the FMU.
+    grids, packed: grid files, and binaries instead of `platforms`, by their path in the FMU.
     """
     if fmi not in FMI_VERSIONS:
         offered = ", ".join(map(str, FMI_VERSIONS))
@@ -156,7 +157,9 @@ def export_interface(
         )
     component = interface.component
     chosen = None if platforms is None else choose_platforms(platforms, fmi=fmi)
-    if chosen is None:
+    if packed:
+        binaries = dict(packed)
+    elif chosen is None:
         binaries = installed_binary(component, fmi=fmi)
     else:
         binaries = build_binaries(component_library(component), chosen, fmi=fmi)

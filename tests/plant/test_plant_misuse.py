@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes as ct
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from states import MACRO, changed, landing, trail
 
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.servos.motor import FULL
 
 
 def refused(plant: Plant, call: Callable[[], Any], status: int, pattern: str) -> None:
@@ -71,6 +73,13 @@ def test_an_input_that_is_no_number_is_refused(
     refused(
         plant, lambda: plant.step(plant.time + MACRO, Command(**values)), INVALID_ARGUMENT, pattern
     )
+
+
+def test_a_weakness_above_1_is_refused(core: ct.CDLL) -> None:
+    plant = midway(core)
+    weak = Command(angle_ref=plant.robot.stance, power=replace(FULL, strength=-0.5))
+    pattern = r"weakness: got 1\.5, expected 0 to 1$"
+    refused(plant, lambda: plant.step(plant.time + MACRO, weak), INVALID_ARGUMENT, pattern)
 
 
 @pytest.mark.parametrize("end", [0.0, -1.0, 0.0199, *BAD_NUMBERS])

@@ -158,15 +158,17 @@ hxStatus hx_definition_check_coordinates(const hxDefinition *d, char *message) {
   return HX_OK;
 }
 
-/* Returns whether no number of an input is outside of the narrowest ranges: of angles, rad, and of
- * all others. Inputs of walks are, and every step asks this first. */
+/* Returns whether no number of an input is outside of the narrowest ranges: of angles, rad, of
+ * shares (weakness and lock, the last numbers) and of all others. Inputs of walks are, and every
+ * step asks this first. */
 static int is_well_inside(const hxInput *input) {
   enum { ANGLES = HX_LEGS * HX_JOINTS, SIZE = sizeof(hxInput) / sizeof(double) };
   const double angle = 6.28, others = 1e4;
   const double *x = &input->angle_ref[0][0];
   int outside = 0;
   for (int i = 0; i < ANGLES; ++i) outside |= !(fabs(x[i]) <= angle);
-  for (int i = ANGLES; i < SIZE; ++i) outside |= !(fabs(x[i]) <= others);
+  for (int i = ANGLES; i < SIZE - 2 * ANGLES; ++i) outside |= !(fabs(x[i]) <= others);
+  for (int i = SIZE - 2 * ANGLES; i < SIZE; ++i) outside |= !(x[i] >= 0.0 && x[i] <= 1.0);
   return !outside;
 }
 
