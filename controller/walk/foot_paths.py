@@ -168,7 +168,7 @@ class FootPaths(Stateful):
         )
         was = back * (carried - feet.way)
         # 1/s    at which the feet pass through their paths
-        pace = 0.0 if self.clock.held else 1.0 / self.swing_time
+        pace = 0.0 if self.clock.waiting else 1.0 / self.swing_time
         pulled = back * feet.pull * (slope * pace)
         # a foot on the ground: dp/dt = -(v + i w p)
         velocity = pulled - (feet.twist.velocity + 1j * feet.twist.yaw_rate * was)
