@@ -272,14 +272,14 @@ class Compliance(Stateful):
             return np.zeros(LEGS, dtype=np.bool_)
         return self.touching & ~self.doubted
 
-    def waits(self, landing: Mask, *, held: bool) -> bool:
+    def waits(self, landing: Mask, *, waiting: bool) -> bool:
         """Returns whether the gait clock waits for the feet of legs that end their swing (C50).
 
-        landing: (6,) these legs; held: it waits already.
+        landing: (6,) these legs; waiting: it waits already.
         """
         if not self.parts.touchdown or self.trust.level < 1.0:
             return False
-        found = self._carries() if held else self.touching
+        found = self._carries() if waiting else self.touching
         hopeful = self.touchdown.offset > -REACH_LIMIT
         return bool((landing & ~found & ~self.doubted & hopeful).any())
 

@@ -46,11 +46,11 @@ def exported(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
 def test_an_importer_gets_the_reference_results(
     plant_build: Path, tmp_path: Path, robot: str
 ) -> None:
-    fmu, name, outputs = tmp_path / f"{robot}.fmu", robot, OUTPUTS
+    fmu, name, outputs = tmp_path / f"{robot}.fmu", robot, list(OUTPUTS)
     if robot in CONTROLS:
         setup = make_setup(load_robot("athena"), control=robot, period=0.004)
         export_controller(setup, fmu)
-        name, outputs = "athena_controller", COMMANDS
+        name, outputs = "athena_controller", list(COMMANDS)
     else:
         export_fmu(load_robot(robot), fmu)
     with zipfile.ZipFile(fmu) as archive:
@@ -63,7 +63,7 @@ def test_an_importer_gets_the_reference_results(
     result = fmpy.simulate_fmu(
         str(fmu),
         input=inputs,
-        output=list(outputs),
+        output=outputs,
         start_time=options["StartTime"],
         stop_time=options["StopTime"],
         output_interval=options["StepSize"],

@@ -85,7 +85,7 @@ static inline hxNumber hx_asin(hxNumber x) {
 static inline hxReal hx_lanes_pow(hxReal x, hxReal y) {
   const double power = hx_pow(hx_re(x), hx_re(y));
   if (!(hx_re(x) > 0.0)) return power;
-  return hx_complex(power, power * (hx_re(y) / hx_re(x) * hx_im(x) + log(hx_re(x)) * hx_im(y)));
+  return hx_complex(power, power * (hx_re(y) / hx_re(x) * hx_im(x) + hx_ln(hx_re(x)) * hx_im(y)));
 }
 
 static inline hxReal hx_expm1(hxReal x) {
