@@ -93,7 +93,7 @@ def replay(
     """
     log = with_speed_references(log, robot)
     with TemporaryFolder("replay") as folder:
-        path = fmu or export_fmu(robot, folder / "robot.fmu")
+        path = fmu or export_fmu(robot, folder / "robot.fmu", bare=True)
         with LogPlant(path, parameters) as plant:
             names = plant.known(log.measured)
             if not names:
