@@ -80,7 +80,7 @@ class Parts:
         Switch,
         Row(
             "a sensor that contradicts the plan is replaced; kinematic control while the robot "
-            "slides or outruns its joints"
+            "slides"
         ),
     ] = True
     squeeze: Annotated[

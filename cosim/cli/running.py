@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.controller import Gains, load_gains
-from hexapod_cosim.cosim.cli.options import ENGINES
+from hexapod_cosim.cosim.cli.options import ENGINES, command_line
 from hexapod_cosim.cosim.cli.terminal import (
     counting_bar,
     progress_bar,
@@ -84,13 +83,10 @@ class Words:
 
     def command(self, name: str, scenario: str) -> str:
         """Returns the command `name` that repeats the run of a scenario."""
-        words = [word for text in self.controls or [] for word in ("--control", text)]
-        words += [word for text in self.settings for word in ("--set", text)]
-        for key in ("seeds", "engine", "fmu", "gains"):
-            value = getattr(self, key)
-            words += [] if value is None else [f"--{key}", str(value)]
-        flags = ["--check-accuracy"] if self.accuracy else []
-        return shlex.join(["hexapod", name, scenario, *words, *flags])
+        return command_line(
+            name, scenario, control=self.controls, set=self.settings, seeds=self.seeds,
+            engine=self.engine, fmu=self.fmu, gains=self.gains, check_accuracy=self.accuracy,
+        )  # fmt: skip
 
 
 def checked_engine(name: str | None, *, runs: int) -> str:

@@ -86,7 +86,7 @@ def start_height(robots: Sequence[Robot]) -> float:
 
 def export_plant(robots: Sequence[Robot], folder: Path) -> Path:
     """Exports the plant's FMU with all grounds. Raises HexapodError."""
-    return export_fmu(robots[0], folder / "plant.fmu", terrains=surfaces(robots))
+    return export_fmu(robots[0], folder / "plant.fmu", terrains=surfaces(robots), bare=True)
 
 
 class Batch(Closing):

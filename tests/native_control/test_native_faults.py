@@ -126,12 +126,12 @@ class LowGround:
     nowhere.
 
     Attributes:
-        held: whether the gait clock waited, for each period.
+        waiting: whether the gait clock waited, for each period.
     """
 
     def __init__(self) -> None:
         self.ground = Ground()
-        self.held: list[bool] = []
+        self.waiting: list[bool] = []
 
     def __call__(self, controller: Controller, step: int, measurement: Measurement) -> None:
         self.ground(controller, step, measurement)
@@ -142,7 +142,7 @@ class LowGround:
         swings = controller.plan.paths.clock.swinging[2]
         measurement.foot_force[2] *= not (swings and lowered[2] > -0.012)
         measurement.foot_force[3] *= step % 700 < 500
-        self.held.append(controller.plan.paths.clock.held)
+        self.waiting.append(controller.plan.paths.clock.waiting)
 
 
 @pytest.mark.parametrize("gait", ["ripple", "amble"])
@@ -152,17 +152,13 @@ def test_feet_that_find_no_ground_are_awaited_at_the_same_step(
     sense = LowGround()
     worst, _ = differences(controller_core, setup_of(gait=gait), sense=sense)
     assert close(worst)
-    assert 0.02 < np.mean(sense.held) < 0.8
+    assert 0.02 < np.mean(sense.waiting) < 0.8
 
 
-@pytest.mark.parametrize(("speed_max", "least", "most"), [(3.0, 0.19, 0.21), (2.6, 0.0, 0.02)])
-def test_feet_of_joints_that_are_too_slow_are_hardly_awaited(
-    controller_core: ct.CDLL, speed_max: float, least: float, most: float
+@pytest.mark.parametrize("speed_max", [3.0, 2.6])
+def test_feet_of_slow_joints_are_awaited_even_if_a_sensor_is_doubted(
+    controller_core: ct.CDLL, speed_max: float
 ) -> None:
-    """At 2.6 rad/s the plan needs more speed for more than a fifth of the time, at 3 rad/s for
-    less. The first waits are earlier than the share of the time is known: a longer walk makes
-    them count less. The sensor of foot 3 is doubted, and the foot is awaited all the same.
-    """
     sense, setup = LowGround(), setup_of()
     slow = replace(setup.robot, servo=replace(setup.robot.servo, speed_max=speed_max))
     robot = replace(setup, robot=slow, gains=make_gains(slow))
@@ -170,10 +166,10 @@ def test_feet_of_joints_that_are_too_slow_are_hardly_awaited(
         controller_core, robot, sense=sense, told=lambda t: program(0.7 * t), steps=2000
     )
     assert close(worst)
-    assert least <= np.mean(sense.held) < most
+    assert 0.19 < np.mean(sense.waiting) < 0.21
 
 
-def test_joints_that_are_outrun_fall_back_at_the_same_step(controller_core: ct.CDLL) -> None:
+def test_joints_that_are_outrun_slow_the_body_without_fallback(controller_core: ct.CDLL) -> None:
     setup = setup_of()
     slow = replace(setup.robot, servo=replace(setup.robot.servo, speed_max=1.2))
     worst, fallback = differences(
@@ -183,5 +179,4 @@ def test_joints_that_are_outrun_fall_back_at_the_same_step(controller_core: ct.C
         steps=2100,
     )
     assert close(worst)
-    assert fallback.all(axis=1).any()
-    assert not fallback[-1].any()
+    assert not fallback.any()

@@ -37,7 +37,7 @@ typedef struct hxCompliance {
   double torque[HX_LEGS][HX_JOINTS]; /* N m, for the servos */
   int doubted[HX_LEGS];              /* the foot's sensor is replaced */
   int misled[HX_LEGS];  /* the foot follows its path: it has just been doubted, or all are */
-  int fallback;         /* kinematic control: the robot slides or its joints do not follow */
+  int fallback;         /* kinematic control: the robot slides or is far too heavy */
   double grip[HX_LEGS]; /* 1, factor on the planned load of a leg that is regaining contact */
   int regaining;        /* some grip may be below 1 */
   double scale;         /* 1    measured over planned weight */
@@ -255,7 +255,7 @@ static inline double feel(const hxComplianceModel *model, const hxLoadPlan *plan
   if (model->parts.fallback)
     laws->fallback =
         hx_trust_step(&model->trust, total > model->settled ? hx_length(common) * share : 0.0,
-                      plan->overspeed, laws->burden.overburdened, &laws->trust) == 0.0;
+                      laws->burden.overburdened, &laws->trust) == 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     laws->load[leg] += model->follow_load * (normal[leg] / model->share - laws->load[leg]);
   const double missing = squeeze_lost(plan, (const hxPlane *)deviation, laws);
@@ -343,15 +343,14 @@ static inline int hx_compliance_meets(const hxComplianceModel *model, int leg,
          !laws->misled[leg];
 }
 
-/* Returns whether the gait clock waits for the feet of legs that end their swing (C50). held: it
+/* Returns whether the gait clock waits for the feet of legs that end their swing (C50). waiting: it
  * waits already. */
 static inline int hx_compliance_waits(const hxComplianceModel *model, const int landing[HX_LEGS],
-                                      int held, const hxCompliance *laws) {
+                                      int waiting, const hxCompliance *laws) {
   int waits = 0;
-  if (!model->parts.touchdown || laws->trust.level < 1.0 || hx_trust_feet_late(&laws->trust))
-    return 0;
+  if (!model->parts.touchdown || laws->trust.level < 1.0) return 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int found = held ? carries(laws, leg) : laws->touching[leg];
+    const int found = waiting ? carries(laws, leg) : laws->touching[leg];
     waits |= landing[leg] && !found && !laws->misled[leg] &&
              laws->touchdown.offset[leg] > -hx_reach_limit;
   }
