@@ -80,7 +80,7 @@ class Parts:
         Switch,
         Row(
             "no feedback from a sensor that contradicts the plan; kinematic control while the "
-            "robot slides or outruns its joints"
+            "robot slides"
         ),
     ] = True
     squeeze: Annotated[

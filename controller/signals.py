@@ -60,5 +60,6 @@ class Diagnostics:
     unreachable: Mask = field(default_factory=_flags)  # the joints could not follow
     fallback: Mask = field(default_factory=_flags)  # walks without feedback
     absent: Mask = field(default_factory=_flags)  # out of service: the others walk without it
+    outrun: Mask = field(default_factory=_flags)  # too slow for the command: the body walks slower
     # (3, 6) joints and legs: servos that do not follow their commands
     faulty: Mask = field(default_factory=lambda: np.zeros((3, LEGS), dtype=np.bool_))

@@ -9,8 +9,8 @@ C: compliance.h. Every period consists of these steps:
 3. Weight. The plan is scaled by the measured weight (C30), so that a payload is carried too.
 4. Torques. They are those of the planned load (C29).
 
-When the whole robot slides, its joints cannot follow or it is far too heavy, `trust` goes to 0 and
-the robot walks under kinematic control (C33).
+When the whole robot slides or is far too heavy, `trust` goes to 0 and the robot walks under
+kinematic control (C33).
 """
 
 from __future__ import annotations
@@ -201,7 +201,7 @@ class Compliance(Stateful):
         if self.parts.fallback:
             drag = abs(deviation.sum()) / total if total > max(self.settled, LOAD_FLOOR) else 0.0
             before, heavy = self.trust.level, self.burden.overburdened
-            goal = self.trust.step(drag, overspeed=plan.overspeed, overburdened=heavy)
+            goal = self.trust.step(drag, overburdened=heavy)
             if before != goal:
                 self.fallback = self.doubted | (goal == 0.0)
         self.load = self.load + self.follow_load * (normal / self.share - self.load)
@@ -272,16 +272,14 @@ class Compliance(Stateful):
             return np.zeros(LEGS, dtype=np.bool_)
         return self.touching & ~self.doubted
 
-    def waits(self, landing: Mask, *, held: bool) -> bool:
+    def waits(self, landing: Mask, *, waiting: bool) -> bool:
         """Returns whether the gait clock waits for the feet of legs that end their swing (C50).
 
-        It does not wait for joints that are too slow: their feet are late on level ground too.
-
-        landing: (6,) these legs; held: it waits already.
+        landing: (6,) these legs; waiting: it waits already.
         """
-        if not self.parts.touchdown or self.trust.level < 1.0 or self.trust.feet_late():
+        if not self.parts.touchdown or self.trust.level < 1.0:
             return False
-        found = self._carries() if held else self.touching
+        found = self._carries() if waiting else self.touching
         hopeful = self.touchdown.offset > -REACH_LIMIT
         return bool((landing & ~found & ~self.doubted & hopeful).any())
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -71,6 +72,12 @@ GainsFile = Annotated[
         "--gains", metavar="FILE", help="Gains from `hexapod design` instead of designing them now."
     ),
 ]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers", min=1, metavar="N", help="Processes; default: one for each processor."
+    ),
+]
 Engine = Annotated[
     str | None,
     typer.Option(
@@ -99,3 +106,17 @@ CheckAccuracy = Annotated[
         help="Walk again at a hundredth of the solver's tolerance: an error beside every metric.",
     ),
 ]
+
+
+def command_line(name: str, *words: object, **options: object) -> str:
+    """Returns the command `name` with words and options; those that are None or False are left out.
+
+    A list is an option for each of its items.
+    """
+    written = ["hexapod", name, *map(str, words)]
+    for key, value in options.items():
+        for item in value if isinstance(value, list) else [value]:
+            flag = f"--{key.replace('_', '-')}"
+            written += [] if item is None or item is False else [flag]
+            written += [] if item is None or isinstance(item, bool) else [str(item)]
+    return shlex.join(written)

@@ -31,8 +31,7 @@ def fallback_warnings(recording: Recording) -> list[str]:
     found = [f"{leg} {share:.0%}" for leg, share in shares if share]
     return [
         f"legs walked without feedback for a share of the time ({', '.join(found)}): a foot's "
-        "sensor contradicted the plan, the robot slid, its joints could not follow, or too many "
-        "sensors failed"
+        "sensor contradicted the plan, the robot slid, or too many sensors failed"
     ]
 
 

@@ -187,33 +187,6 @@ def test_a_leg_that_should_stand_and_does_not_is_given_no_share_until_it_does() 
     np.testing.assert_allclose(laws.torque[2], full[2], rtol=0.05)
 
 
-def test_a_robot_that_outruns_its_joints_goes_over_to_kinematic_control() -> None:
-    """The criterion is the share of time in which a joint exceeds its speed, smoothed over a gait
-    cycle. Control becomes compliant again when the share falls.
-    """
-    laws, force = make_laws(), squeezing()
-    run(laws, force, 400)
-    for share, lagging in ((0.4, False), (0.5, True), (0.4, True), (0.3, False)):
-        for cycle in range(12):
-            for k in range(100):
-                plan(laws, overspeed=k % 10 < round(10 * share))
-                laws.feel(force)
-            assert cycle < 6 or laws.trust.lagging is lagging
-        assert bool(laws.fallback.all()) is lagging
-
-
-@pytest.mark.parametrize(("share", "awaited"), [(0.1, True), (0.3, False)])
-def test_a_foot_in_the_air_is_awaited_unless_joints_are_too_slow_for_a_fifth_of_the_time(
-    share: float, awaited: bool
-) -> None:
-    laws, force, landing = make_laws(), squeezing(), np.arange(6) == 2
-    force[2] = 0.0
-    for k in range(600):
-        plan(laws, standing="110111", overspeed=k % 10 < round(10 * share))
-        laws.feel(force)
-    assert laws.waits(landing, held=False) is awaited
-
-
 # Tests how compliant control uses its sensors: axes of forces, positions of feet, wrong sensors.
 
 

@@ -132,6 +132,7 @@ static void fold(const hxControllerModel *model, const hxControllerInput *input,
   const int back = hx_absence_fold(&model->plan.absent, model->plan.planner.leg, input->angle,
                                    &state->health, &state->plan.absence, &state->output);
   memcpy(state->output.absent, state->plan.absence.legs, sizeof state->output.absent);
+  memcpy(state->output.outrun, state->plan.pace.outrun, sizeof state->output.outrun);
   memcpy(state->output.faulty, state->health.faulty, sizeof state->output.faulty);
   if (back < 0 || state->back) return;
   state->back = back + 1;
@@ -156,7 +157,7 @@ void hx_controller_tick(const hxControllerModel *model, const hxControllerInput 
   const double command[HX_COMMANDS] = {input->command.vx,       input->command.vy,
                                        input->command.yaw_rate, input->command.height,
                                        input->command.roll,     input->command.pitch};
-  const int command_changed = hx_command_ramp_aim(&model->plan.ramp, command, &state->plan.ramp);
+  const int command_changed = hx_walk_plan_aim(&model->plan, command, &state->plan);
   hxPresentStep present;
   /* the first tick commands the stance, whatever the input */
   if (state->tick > 0 && model->feels) watch(model, input, state);

@@ -118,11 +118,7 @@ class _Problem:
 
 
 def fit_servo(
-    logs: Sequence[BenchLog],
-    robot: Robot,
-    model: str | None,
-    *,
-    seeds: int = SEEDS,
+    logs: Sequence[BenchLog], robot: Robot, model: str | None, *, seeds: int = SEEDS
 ) -> ServoFit:
     """Returns the servo that follows bench logs best.
 

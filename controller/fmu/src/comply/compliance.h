@@ -35,8 +35,7 @@ typedef struct hxCompliance {
   double load[HX_LEGS];              /* 1    smoothed, in thirds of the weight */
   double torque[HX_LEGS][HX_JOINTS]; /* N m, for the servos */
   int doubted[HX_LEGS];              /* the foot's sensor is not trusted */
-  /* walks without feedback, because the sensor is not trusted, the robot slides, or its joints do
-   * not follow */
+  /* walks without feedback, because the sensor is not trusted, or the robot slides */
   int fallback[HX_LEGS];
   double grip[HX_LEGS]; /* 1, factor on the planned load of a leg that is regaining contact */
   int regaining;        /* some grip may be below 1 */
@@ -187,11 +186,9 @@ static inline int contacts_differ(const hxLoadPlan *plan, const hxCompliance *la
 /* -------------------------------------------------------------------------- inputs and weight */
 
 /* Updates the trust and with it the legs without feedback (C33). drag: as for hx_trust_step. */
-static inline void update_trust(const hxComplianceModel *model, const hxLoadPlan *plan, double drag,
-                                hxCompliance *laws) {
+static inline void update_trust(const hxComplianceModel *model, double drag, hxCompliance *laws) {
   const double before = laws->trust.level,
-               goal = hx_trust_step(&model->trust, drag, plan->overspeed, laws->burden.overburdened,
-                                    &laws->trust);
+               goal = hx_trust_step(&model->trust, drag, laws->burden.overburdened, &laws->trust);
   if (before == goal) return;
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->fallback[leg] = laws->doubted[leg] || goal == 0.0;
 }
@@ -229,7 +226,7 @@ static inline double feel(const hxComplianceModel *model, const hxLoadPlan *plan
   }
   const double share = total > load_floor ? 1.0 / total : 0.0;
   if (model->parts.fallback)
-    update_trust(model, plan, total > model->settled ? hx_length(common) * share : 0.0, laws);
+    update_trust(model, total > model->settled ? hx_length(common) * share : 0.0, laws);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     laws->load[leg] += model->follow_load * (normal[leg] / model->share - laws->load[leg]);
   const double missing = squeeze_lost(plan, (const hxPlane *)deviation, laws);
@@ -314,15 +311,14 @@ static inline int hx_compliance_meets(const hxComplianceModel *model, int leg,
          !laws->doubted[leg];
 }
 
-/* Returns whether the gait clock waits for the feet of legs that end their swing (C50). held: it
+/* Returns whether the gait clock waits for the feet of legs that end their swing (C50). waiting: it
  * waits already. */
 static inline int hx_compliance_waits(const hxComplianceModel *model, const int landing[HX_LEGS],
-                                      int held, const hxCompliance *laws) {
+                                      int waiting, const hxCompliance *laws) {
   int waits = 0;
-  if (!model->parts.touchdown || laws->trust.level < 1.0 || hx_trust_feet_late(&laws->trust))
-    return 0;
+  if (!model->parts.touchdown || laws->trust.level < 1.0) return 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int found = held ? carries(laws, leg) : laws->touching[leg];
+    const int found = waiting ? carries(laws, leg) : laws->touching[leg];
     waits |= landing[leg] && !found && !laws->doubted[leg] &&
              laws->touchdown.offset[leg] > -hx_reach_limit;
   }

@@ -6,15 +6,13 @@
 #include "../plane.h"
 
 typedef struct hxTrustModel {
-  double period;                    /* s */
-  double follow_load, follow_cycle; /* 1, factors of the smoothings over a period */
-  int64_t calm;                     /* steps without sliding until feet are trusted again */
+  double period;      /* s */
+  double follow_load; /* 1, factor of the smoothing over a period */
+  int64_t calm;       /* steps without sliding until feet are trusted again */
 } hxTrustModel;
 
 typedef struct hxTrust {
   double level;             /* 1, factor on all torques */
-  int lagging;              /* the joints cannot follow the plan */
-  double overspeed_share;   /* 1, share of the time in which the plan exceeds a speed limit */
   int64_t slide_periods;    /* steps for which the robot has been sliding */
   int64_t recovery_periods; /* steps that remain until feedback resumes after sliding */
 } hxTrust;
@@ -36,10 +34,7 @@ static const double sliding_drag = 0.55;
 /* 1, gait cycles without sliding until feet are trusted again */
 static const double calm_cycles = 0.5;
 static const double sliding_time = 0.04; /* s, longer than a foot skids at touch-down */
-/* 1, share of the time in which joints would need more speed than a servo has */
-static const double joints_follow = 0.35, joints_do_not = 0.45;
-static const double feet_late = 0.2; /* 1, the same, from which feet end their swings late */
-static const double trusted = 0.99;  /* 1, so near to its goal the trust is at it */
+static const double trusted = 0.99;      /* 1, so near to its goal the trust is at it */
 /* s, a force of this duration on a foot in mid-swing is a contradiction */
 static const double airborne_time = 0.06;
 /* s, no force for this time on a foot that should carry load is a contradiction; both exceed the
@@ -52,30 +47,21 @@ static inline void hx_trust_compile(const hxControllerDefinition *definition, hx
   const double period = definition->period, cycle = definition->gait.period;
   model->period = period;
   model->follow_load = 1.0 - hx_decay(-period / definition->gains.support.load_time);
-  model->follow_cycle = 1.0 - hx_decay(-period / cycle);
   const double calm = nearbyint(calm_cycles * cycle / period);
   model->calm = (int64_t)calm;
 }
 
-/* Returns whether the joints are so slow that feet end their swings late anywhere. */
-static inline int hx_trust_feet_late(const hxTrust *trust) {
-  return trust->overspeed_share > feet_late;
-}
-
 /* Advances the trust by one period (C33) and returns the level that it goes to, 0 or 1. drag: the
- * common tangential force of the feet beyond the plan, over the normal force; overspeed: the plan
- * exceeds the speed limit of some joint; overburdened: the robot is far too heavy for its servos.
- */
-static inline double hx_trust_step(const hxTrustModel *model, double drag, int overspeed,
-                                   int overburdened, hxTrust *trust) {
-  trust->overspeed_share += model->follow_cycle * ((double)overspeed - trust->overspeed_share);
-  trust->lagging = trust->overspeed_share > (trust->lagging ? joints_follow : joints_do_not);
+ * common tangential force of the feet beyond the plan, over the normal force; overburdened: the
+ * robot is far too heavy for its servos. */
+static inline double hx_trust_step(const hxTrustModel *model, double drag, int overburdened,
+                                   hxTrust *trust) {
   trust->slide_periods = drag > sliding_drag ? trust->slide_periods + 1 : 0;
   if ((double)trust->slide_periods * model->period > sliding_time)
     trust->recovery_periods = model->calm;
   else if (trust->recovery_periods)
     --trust->recovery_periods;
-  const double goal = trust->recovery_periods || trust->lagging || overburdened ? 0.0 : 1.0;
+  const double goal = trust->recovery_periods || overburdened ? 0.0 : 1.0;
   if (trust->level == goal) return goal;
   trust->level += model->follow_load * (goal - trust->level);
   if (fabs(goal - trust->level) < 1.0 - trusted) trust->level = goal;
