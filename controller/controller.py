@@ -15,11 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.controller.checks import (
-    ControllerError,
-    check_law,
-    check_period,
-)
+from hexapod_cosim.controller.checks import ControllerError, check_law, check_period
 from hexapod_cosim.controller.comply.compliant import Compliant, sense
 from hexapod_cosim.controller.comply.paper import Paper, Step
 from hexapod_cosim.controller.comply.posture import LEVEL

@@ -11,21 +11,11 @@ from typing import Any
 
 from hexapod_cosim.controller import Gains, load_gains
 from hexapod_cosim.cosim.cli.options import ENGINES, command_line
-from hexapod_cosim.cosim.cli.terminal import (
-    counting_bar,
-    progress_bar,
-    show_table,
-    waiting,
-    warn,
-)
+from hexapod_cosim.cosim.cli.terminal import counting_bar, progress_bar, show_table, waiting, warn
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
-from hexapod_cosim.cosim.results.accuracy import (
-    Accuracy,
-    compare_accuracy,
-    reference_scenario,
-)
+from hexapod_cosim.cosim.results.accuracy import Accuracy, compare_accuracy, reference_scenario
 from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.folder import ResultsFolder, write_result
 from hexapod_cosim.cosim.results.recordings import check_formats
@@ -110,10 +100,7 @@ def titled(plan: Scenario, settings: Sequence[str]) -> Scenario:
 
 
 def run_into(
-    plan: Scenario,
-    folders: Sequence[ResultsFolder],
-    command: str,
-    options: RunOptions,
+    plan: Scenario, folders: Sequence[ResultsFolder], command: str, options: RunOptions
 ) -> tuple[Result, list[Path]]:
     """Runs a scenario and writes its results into the last of the folders.
 
@@ -192,9 +179,7 @@ def chosen_controls(texts: Sequence[str], plan: Scenario) -> tuple[Control, ...]
 
 
 def check_accuracy(
-    plans: Sequence[Scenario],
-    runs: Sequence[Summary],
-    options: RunOptions,
+    plans: Sequence[Scenario], runs: Sequence[Summary], options: RunOptions
 ) -> Accuracy:
     """Returns the accuracy of runs of one control, whose results are in a folder already.
 

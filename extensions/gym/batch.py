@@ -58,10 +58,7 @@ def grounds(settings: EnvSettings) -> tuple[Robot, ...]:
     own = load_robot(settings.robot)
     foot = replace(own.foot, pad_radius=settings.pad_radius or own.foot.pad_radius)
     solver = replace(
-        own.solver,
-        method=settings.solver,
-        tolerance=settings.tolerance,
-        step_max=settings.step_max,
+        own.solver, method=settings.solver, tolerance=settings.tolerance, step_max=settings.step_max
     )
     found = []
     for seed in range(1, settings.terrain_seeds + 1):

@@ -10,13 +10,7 @@ from typing import Annotated
 import typer
 
 from hexapod_cosim.cosim.cli.options import Json, RobotName, Workers, command_line
-from hexapod_cosim.cosim.cli.terminal import (
-    show_files,
-    show_json,
-    show_table,
-    show_text,
-    warn,
-)
+from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table, show_text, warn
 from hexapod_cosim.cosim.results.folder import results_folder
 from hexapod_cosim.extensions.identify.bench.log import GROUPINGS
 from hexapod_cosim.extensions.identify.log import HELD_OUT, read_log
@@ -43,8 +37,7 @@ Find = Annotated[
     ),
 ]
 HeldOut = Annotated[
-    float,
-    typer.Option("--held-out", metavar="SHARE", help="Part of each log that only judges."),
+    float, typer.Option("--held-out", metavar="SHARE", help="Part of each log that only judges.")
 ]
 Friction = Annotated[
     str | None,

@@ -75,11 +75,7 @@ class Replay:
 
 
 def replay(
-    log: Log,
-    robot: Robot,
-    *,
-    fmu: Path | None = None,
-    parameters: Mapping[str, Any] | None = None,
+    log: Log, robot: Robot, *, fmu: Path | None = None, parameters: Mapping[str, Any] | None = None
 ) -> Replay:
     """Simulates a robot from the log's first row on, with the log's commands.
 

@@ -156,9 +156,10 @@ def test_feet_that_find_no_ground_are_awaited_at_the_same_step(
 
 
 @pytest.mark.parametrize("speed_max", [3.0, 2.6])
-def test_feet_of_slow_joints_are_awaited_even_if_a_sensor_is_doubted(
+def test_feet_of_joints_that_are_too_slow_are_awaited_as_others_are(
     controller_core: ct.CDLL, speed_max: float
 ) -> None:
+    """Steps on the spot need 2.9 rad/s. The sensor of foot 3 is doubted."""
     sense, setup = LowGround(), setup_of()
     slow = replace(setup.robot, servo=replace(setup.robot.servo, speed_max=speed_max))
     robot = replace(setup, robot=slow, gains=make_gains(slow))
@@ -169,7 +170,9 @@ def test_feet_of_slow_joints_are_awaited_even_if_a_sensor_is_doubted(
     assert 0.19 < np.mean(sense.waiting) < 0.21
 
 
-def test_joints_that_are_outrun_slow_the_body_without_fallback(controller_core: ct.CDLL) -> None:
+def test_joints_that_are_outrun_hand_nothing_over_to_kinematic_control(
+    controller_core: ct.CDLL,
+) -> None:
     setup = setup_of()
     slow = replace(setup.robot, servo=replace(setup.robot.servo, speed_max=1.2))
     worst, fallback = differences(
