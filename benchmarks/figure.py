@@ -26,12 +26,7 @@ from benchmarks.walks import DURATION
 from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
 
 SHOWN = (1e-9, 1.0)  # m
-NAMES = {
-    OURS: "this plant",
-    "mujoco": "MuJoCo",
-    "pinocchio": "Pinocchio",
-    "drake": "Drake",
-}
+NAMES = {OURS: "this plant", "mujoco": "MuJoCo", "pinocchio": "Pinocchio", "drake": "Drake"}
 COLOURS = (*PALETTE, "0.55")
 MARKERS = "osD^v"
 CELLS: dict[Any, Any] = {"str": str, "float": float}  # conversions by a field's type

@@ -262,11 +262,7 @@ def _rest(parts: Parts) -> Iterable[Row]:
     ]
     for driven, factor, goal in loops:
         yield Row(
-            figure=f"whole co-simulation, {driven}",
-            unit="x",
-            ours=factor,
-            goal=goal,
-            better="more",
+            figure=f"whole co-simulation, {driven}", unit="x", ours=factor, goal=goal, better="more"
         )
     yield Row(
         figure="an instance, its structure", unit="byte", ours=parts.structure, goal=MEMORY_GOAL

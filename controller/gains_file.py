@@ -32,11 +32,7 @@ def raising_gains_errors() -> Iterator[None]:
         yield
     except RobotError as error:
         raise GainsError(
-            error.what,
-            got=error.got,
-            expected=error.expected,
-            fix=error.fix,
-            where=error.where,
+            error.what, got=error.got, expected=error.expected, fix=error.fix, where=error.where
         ) from error
 
 

@@ -119,10 +119,7 @@ class Paper(Stateful):
         slope = (even * moment - skew * moment.conjugate()) / size if spread > 0.0 else 0j
         height, old = self.sag
         now = mean - along(centre, slope)
-        self.sag = (
-            height + self.smoothing * (now - height),
-            old + self.smoothing * (slope - old),
-        )
+        self.sag = (height + self.smoothing * (now - height), old + self.smoothing * (slope - old))
         if self.parts.paper_pid:
             astray = complex(part @ (found[:, 0] + 1j * found[:, 1]))
             back = self.back - self.period * self.gains.return_rate * astray

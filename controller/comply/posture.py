@@ -35,9 +35,7 @@ class Posture(NamedTuple):
         if not any((height, roll, pitch, height_rate, roll_rate, pitch_rate)):
             return LEVEL
         cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-        rotation = np.array(
-            [[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]],
-        )
+        rotation = np.array([[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]])
         spin = (roll_rate, pitch_rate * cr, -pitch_rate * sr)
         return cls(False, height, rotation, height_rate, spin)
 

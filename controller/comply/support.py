@@ -33,13 +33,7 @@ class Support:
     """Computes activations and load shares for one gait of one robot."""
 
     def __init__(
-        self,
-        robot: Robot,
-        gait: Gait,
-        gains: SupportGains,
-        *,
-        rest: Demand,
-        active: bool = True,
+        self, robot: Robot, gait: Gait, gains: SupportGains, *, rest: Demand, active: bool = True
     ) -> None:
         """Computes the constants of gait and ground.
 

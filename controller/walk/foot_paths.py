@@ -300,10 +300,7 @@ class FootPaths(Stateful):
     def _odometry(self, before: PlannedFeet, twist: Twist) -> tuple[complex, float]:
         """Returns position [m] and heading [rad] of the walking frame in the ground frame (C3)."""
         last = before.twist
-        mean = Twist(
-            0.5 * (twist.velocity + last.velocity),
-            0.5 * (twist.yaw_rate + last.yaw_rate),
-        )
+        mean = Twist(0.5 * (twist.velocity + last.velocity), 0.5 * (twist.yaw_rate + last.yaw_rate))
         way = before.way + cis(before.turn) * travel(mean, self.period)
         return complex(way), before.turn + mean.yaw_rate * self.period
 

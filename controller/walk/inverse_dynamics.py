@@ -106,8 +106,7 @@ class InverseDynamics:
         point[:, 2] = knee + pose.tibia * self.com[:, 2]
         aside = point.real + 1j * self.side
         place, height = posture.turn(
-            legs.place[:, None] + pose.heading[:, None] * aside,
-            legs.hip[2][:, None] + point.imag,
+            legs.place[:, None] + pose.heading[:, None] * aside, legs.hip[2][:, None] + point.imag
         )
         torso_place, torso_height = posture.turn(self.torso_com, self.torso_com_z)
         return Masses(

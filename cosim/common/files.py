@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -62,9 +61,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
         raise not_writable(path.parent, error) from error
     try:
         yield temporary
-        flush_file(temporary)
         temporary.replace(path)
-        flush_folder(path.parent)
     except OSError as error:
         raise not_writable(path, error) from error
     finally:
@@ -84,42 +81,14 @@ def file_stamp(path: Path) -> tuple[int, int]:
     return facts.st_mtime_ns, facts.st_size
 
 
-def flush_file(path: Path) -> None:
-    """Flushes a file's content to the disk, so that a loss of power cannot take it."""
-    with path.open("rb+") as file:
-        os.fsync(file.fileno())
-
-
-def flush_folder(folder: Path) -> None:
-    """Flushes a rename to the disk; Windows offers no way to do so."""
-    if hasattr(os, "O_DIRECTORY"):
-        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
-
-
 @contextmanager
 def atomic_text(path: Path) -> Iterator[TextIO]:
-    """Yields a text file (UTF-8) that replaces `path` when the block succeeds.
-
-    Raises HexapodError for text with the name of a file whose bytes are no UTF-8.
-    """
-    try:
-        with (
-            atomic_path(path) as temporary,
-            temporary.open("w", encoding="utf-8", newline="\n") as file,
-        ):
-            yield file
-    except UnicodeEncodeError as error:
-        raise HexapodError(
-            "cannot write",
-            got=f"the character {error.object[error.start]!r}",
-            expected="names of files in UTF-8",
-            fix="rename the file that has it, or set LC_ALL=C.UTF-8",
-            where=str(path),
-        ) from error
+    """Yields a text file (UTF-8) that replaces `path` when the block succeeds."""
+    with (
+        atomic_path(path) as temporary,
+        temporary.open("w", encoding="utf-8", newline="\n") as file,
+    ):
+        yield file
 
 
 def write_text(path: Path, text: str) -> None:

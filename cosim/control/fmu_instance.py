@@ -183,8 +183,7 @@ class ControllerFmu3:
         """Steps from t to t + h [s]. Raises StepError."""
         what = f"the FMU refuses the step from {t:.6g} s"
         *_, early, reached = self.called(
-            lambda: self.slave.doStep(currentCommunicationPoint=t, communicationStepSize=h),
-            what,
+            lambda: self.slave.doStep(currentCommunicationPoint=t, communicationStepSize=h), what
         )
         if early:
             raise StepError(

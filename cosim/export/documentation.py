@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import math
 import posixpath
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from xml.etree import ElementTree
@@ -28,7 +28,6 @@ AZIMUTH, ELEVATION = math.radians(-52.0), math.radians(27.0)  # of the eye
 # unit vector towards the light, world axes
 LIGHT = np.array([0.35, 0.55, 1.0]) / np.linalg.norm([0.35, 0.55, 1.0])
 AMBIENT = 0.38  # share of ambient light
-SHADOW = (0, 0, 0, 80)  # red, green, blue and opacity
 SAMPLES = 4  # per pixel and direction
 MARGIN = 1.08  # size of the picture relative to the robot
 THICKNESS = (0.30, 0.24, 0.17)  # radius of coxa, femur, tibia relative to the coxa's length
@@ -96,7 +95,7 @@ def draw_robot(robot: Robot, *, width: int, height: int) -> bytes:
     scale = SAMPLES / (MARGIN * float(np.max((high - low) / (width, height))))  # pixels per metre
     origin = 0.5 * np.array(image.size) - scale * 0.5 * (low + high) * (1.0, -1.0)
     pen = ImageDraw.Draw(image)
-    for shape in [*_shadows(shapes, camera), *shapes]:
+    for shape in shapes:
         _draw(pen, shape, origin, scale)
     data = io.BytesIO()
     image.reduce(SAMPLES).save(data, "PNG", optimize=True)
@@ -171,19 +170,6 @@ def _faces(robot: Robot, middle: Array, turn: Array, camera: Array) -> list[Shap
         colour = _lit(COLOURS["torso"], side * float(turn[:, axis] @ LIGHT))
         found.append(Shape(points @ camera.T, colour))
     return found
-
-
-def _shadows(shapes: Iterable[Shape], camera: Array) -> list[Shape]:
-    """Returns the shadows of shapes on the plane z = 0 of the world."""
-    up, lamp = camera[:, 2], camera @ LIGHT
-    return [
-        Shape(
-            shape.points - np.outer(shape.points @ up, lamp) / float(up @ lamp),
-            SHADOW,
-            shape.radius,
-        )
-        for shape in shapes
-    ]
 
 
 def _lit(colour: Sequence[float], cosine: float) -> Colour:

@@ -64,11 +64,7 @@ def load_controller_interface(setup: ControllerSetup) -> Interface:
 
 def controller_roots(setup: ControllerSetup) -> SimpleNamespace:
     """Returns the objects that start values in the controller's interface.toml refer to."""
-    settings = SimpleNamespace(
-        control=setup.control,
-        period=setup.period,
-        upright=UPRIGHT,
-    )
+    settings = SimpleNamespace(control=setup.control, period=setup.period, upright=UPRIGHT)
     gains = passive_gains(setup.robot) if setup.gains is None else setup.gains
     return SimpleNamespace(
         robot=setup.robot, gait=setup.gait, gains=gains, parts=setup.parts, settings=settings

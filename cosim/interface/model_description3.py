@@ -48,12 +48,7 @@ EVENTS = (
     "providesIntermediateUpdate",
     "canReturnEarlyAfterIntermediateUpdate",
 )
-TYPES = {
-    "Real": "Float64",
-    "Enumeration": "Enumeration",
-    "Integer": "Int64",
-    "Boolean": "Boolean",
-}
+TYPES = {"Real": "Float64", "Enumeration": "Enumeration", "Integer": "Int64", "Boolean": "Boolean"}
 TIME = "time"
 
 

@@ -61,11 +61,7 @@ LOST_TEXTS = {
     "command": "the joint commands are lost, and the last one holds",
     "step": "macro-steps are dropped: the last readings and joint commands hold",
 }
-SERVO_TEXTS = {
-    "weak": "gives {share:g} of its torque",
-    "limp": "is limp",
-    "locked": "is locked",
-}
+SERVO_TEXTS = {"weak": "gives {share:g} of its torque", "limp": "is limp", "locked": "is locked"}
 
 
 @contextmanager

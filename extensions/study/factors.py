@@ -188,10 +188,7 @@ def _bound(table: Any, where: str) -> dict[str, float]:
 
 
 EVERY_RUN = Bound(metric=WALKED, at_least=1.0)
-EVALUATION: Rules = {
-    "scenarios": (texts, REQUIRED),
-    "seeds": (seeds, range(1)),
-}
+EVALUATION: Rules = {"scenarios": (texts, REQUIRED), "seeds": (seeds, range(1))}
 OPTIMISE: Rules = {
     "metric": (Choice(OBJECTIVES).read, REQUIRED),
     "constraints": (_bounds, (EVERY_RUN,)),

@@ -34,12 +34,7 @@ from hexapod_cosim.extensions.study.store import BOOLEAN, INTEGER, REAL, TEXT, W
 KIND = "study"  # in run.json
 MANIFEST, LOCK, RESULTS, OPTIMUM = "manifest.json", ".lock", "results.parquet", "optimum.json"
 MAX_NAMED = 6  # differences in a message
-PARQUET_TYPES = {
-    INTEGER: pa.int64(),
-    REAL: pa.float64(),
-    TEXT: pa.string(),
-    BOOLEAN: pa.bool_(),
-}
+PARQUET_TYPES = {INTEGER: pa.int64(), REAL: pa.float64(), TEXT: pa.string(), BOOLEAN: pa.bool_()}
 
 
 def begin_folder(folder: Path, manifest: Mapping[str, Any], *, command: str) -> None:

@@ -23,13 +23,7 @@ PARAMETERS = "parameters."  # an optional prefix of names
 
 
 def require(
-    holds: bool,
-    got: Any,
-    expected: str,
-    where: str,
-    *,
-    what: str = "",
-    fix: str = "correct it",
+    holds: bool, got: Any, expected: str, where: str, *, what: str = "", fix: str = "correct it"
 ) -> None:
     """Raises StudyError unless a condition holds; see HexapodError for the texts."""
     if not holds:

@@ -168,10 +168,7 @@ def test_a_torso_that_sinks_has_fallen(call: Call, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("undrawn")
-@pytest.mark.parametrize(
-    ("upright", "code"),
-    [((True, True), 0), ((True, False), 3)],
-)
+@pytest.mark.parametrize(("upright", "code"), [((True, True), 0), ((True, False), 3)])
 def test_a_fall_under_either_control_ends_a_comparison_with_the_code_of_falls(
     call: Call,
     tmp_path: Path,

@@ -12,10 +12,7 @@ import pytest
 
 from hexapod_cosim.controller import make_gait
 from hexapod_cosim.cosim.export.plant import export_controller
-from hexapod_cosim.cosim.interface.controller import (
-    ControllerSetup,
-    controller_parameters,
-)
+from hexapod_cosim.cosim.interface.controller import ControllerSetup, controller_parameters
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_block import StepError
 from hexapod_cosim.models import LEG_NAMES, load_robot

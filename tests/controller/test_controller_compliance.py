@@ -267,10 +267,7 @@ def test_the_slow_loops_see_a_robot_that_does_what_is_planned_where_it_is_planne
 
 def test_reaching_for_missing_ground_is_told_to_the_servos_as_speed() -> None:
     """Foot 1 measures no force, the other feet carry its load."""
-    controller = make(
-        compliant=True,
-        parts=Parts(support=False, posture=False, path=False),
-    )
+    controller = make(compliant=True, parts=Parts(support=False, posture=False, path=False))
     measurement = Measurement(angle=controller._out.angle_ref)  # the joints follow at once
     measurement.foot_force[:, 2] = 11.0
     measurement.foot_force[1] = 0.0

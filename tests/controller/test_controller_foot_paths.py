@@ -26,11 +26,7 @@ class Walk:
     """
 
     def __init__(
-        self,
-        name: str = "tripod",
-        *,
-        period: float = PERIOD,
-        touchdown_speed: float = 0.0,
+        self, name: str = "tripod", *, period: float = PERIOD, touchdown_speed: float = 0.0
     ) -> None:
         robot = load_robot("athena")
         self.gait = make_gait(robot, name, touchdown_speed=touchdown_speed)

@@ -21,14 +21,7 @@ from hexapod_cosim.models.dynamics import masses
 from hexapod_cosim.models.kinematics import body_states, foot_centres
 
 ROBOTS = ("athena", "phantomx_mk4", "sts3215_hexapod")
-POINT = (
-    1e-12,
-    1e-12,
-    1e-12,
-    0.0,
-    0.0,
-    0.0,
-)  # kg m2; negligible, as of a point mass
+POINT = (1e-12, 1e-12, 1e-12, 0.0, 0.0, 0.0)  # kg m2; negligible, as of a point mass
 # N, N m; second differences of 1 m have errors of 4 eps/h^2 = 4e-11 m/s2, times some kg
 ROUND_OFF = 1e-9
 # N m; the twin's axes turn by (h w)^2 = 3e-5 in a period, which acts on rotors of 0.01 kg m2 at 10

@@ -9,12 +9,7 @@ from gains import make_gains
 from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Measurement, make_gait
 from hexapod_cosim.controller.plane import LEGS, Mask
 from hexapod_cosim.controller.sense.health import PROOF_TIME, STRANGE_TIME, Health
-from hexapod_cosim.controller.walk.absence import (
-    BACK_TIME,
-    SHIFT_TIME,
-    Absence,
-    gait_without,
-)
+from hexapod_cosim.controller.walk.absence import BACK_TIME, SHIFT_TIME, Absence, gait_without
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot, load_robot
 
@@ -29,12 +24,7 @@ def mask(*legs: int) -> Mask:
 
 
 def steps_until_faulty(
-    offset: float,
-    *,
-    force: float = 0.0,
-    drift: float = 0.0,
-    most: int = 100,
-    robot: Robot = ROBOT,
+    offset: float, *, force: float = 0.0, drift: float = 0.0, most: int = 100, robot: Robot = ROBOT
 ) -> int:
     """Returns the steps until the femur of LF is found faulty, `most` if it is not.
 

@@ -126,10 +126,7 @@ def test_plant_and_controller_stand_in_the_chosen_stance() -> None:
 
 
 def test_the_report_says_how_the_controls_walk_when_they_differ() -> None:
-    facts = {
-        "kinematic": walk(control="kinematic").as_facts(),
-        "compliant": walk().as_facts(),
-    }
+    facts = {"kinematic": walk(control="kinematic").as_facts(), "compliant": walk().as_facts()}
     assert gait_differences(facts) == [
         "kinematic: tripod, period 1 s, the robot file's stance, chosen by the robot file",
         "compliant: amble, period 1.5 s, feet 20 mm nearer to the hips and 19 mm deeper below "

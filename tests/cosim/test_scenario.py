@@ -40,12 +40,7 @@ def test_the_scenario_as_run_reads_back_as_the_same(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("setting", "value"),
-    [
-        ("macro_step=5 ms", 0.005),
-        ("duration=1 min", 60.0),
-        ("start=-3", -3.0),
-    ],
+    ("setting", "value"), [("macro_step=5 ms", 0.005), ("duration=1 min", 60.0), ("start=-3", -3.0)]
 )
 def test_a_quantity_may_say_its_unit(setting: str, value: float) -> None:
     key = setting.partition("=")[0]

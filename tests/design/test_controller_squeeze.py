@@ -41,11 +41,7 @@ def shares_of(standing: str, asked: Demand = REST) -> Shares:
 
 
 def squeezed(
-    shares: Shares,
-    squeeze: float,
-    *,
-    friction: float = FRICTION,
-    asked: Demand = REST,
+    shares: Shares, squeeze: float, *, friction: float = FRICTION, asked: Demand = REST
 ) -> Shares:
     planned = PlannedSqueeze(friction=friction, weight=WEIGHT, depth=DEPTH)
     return planned.add(HOME, asked, shares, squeeze)

@@ -17,11 +17,7 @@ from hexapod_cosim.controller.design import StandingPlant, design_gains
 from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.cosim.design.gains import STANCES, design_for, examine_stances, level_fmu
 from hexapod_cosim.cosim.design.linearise import Bench
-from hexapod_cosim.cosim.design.stance import (
-    StanceDesign,
-    find_stance,
-    walked,
-)
+from hexapod_cosim.cosim.design.stance import StanceDesign, find_stance, walked
 from hexapod_cosim.cosim.design.standing import lifted_stance, loads, rest
 from hexapod_cosim.models import Robot, load_robot
 

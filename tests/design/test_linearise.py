@@ -24,10 +24,7 @@ PERIOD = 0.005  # s
 PREDICTED = 2e-3
 SMALL = 1e-4  # rad    of the inputs' changes there
 # 1    slope of friction and stiffness of the contact, of the robot's own
-STUCK, HARD = (
-    300.0,
-    100.0,
-)
+STUCK, HARD = (300.0, 100.0)
 # 1    what still creeps of a force in 0.3 s, and the contact's compliance beside the leg's
 YIELDED = 0.01
 BALANCE = 1e-4  # 1    of the force: rest is reached to 1e-3 m/s

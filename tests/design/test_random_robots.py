@@ -12,12 +12,7 @@ from pathlib import Path
 from statistics import median
 
 import pytest
-from random_robots import (
-    COUNT,
-    draw_robot,
-    hip_height,
-    walk_of,
-)
+from random_robots import COUNT, draw_robot, hip_height, walk_of
 from scaled_robots import scaled_robot
 
 from hexapod_cosim.cosim.design.gains import design_for

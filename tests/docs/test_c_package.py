@@ -59,16 +59,7 @@ def vendored(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def prefix(vendored: Path) -> Path:
     """Where it is installed; it is moved there afterwards, since an installation may be."""
     build, first, moved = (vendored.parent / name for name in ("build", "first", "moved"))
-    output(
-        CMAKE,
-        "-S",
-        vendored,
-        "-B",
-        build,
-        *NINJA,
-        "-DCMAKE_BUILD_TYPE=Debug",
-        "-DHX_LINT=ON",
-    )
+    output(CMAKE, "-S", vendored, "-B", build, *NINJA, "-DCMAKE_BUILD_TYPE=Debug", "-DHX_LINT=ON")
     output(CMAKE, "--build", build)
     output(CMAKE, "--install", build, "--prefix", first)
     first.rename(moved)

@@ -165,9 +165,7 @@ def test_a_core_includes_itself_its_header_and_the_c_library(component: str) -> 
             path.relative_to(ROOT / "plant_fmu/include/hexapod").as_posix()
             for path in c_files("include/hexapod")
         },
-        "controller/fmu": {
-            *("controller.h", "generated/controller_settings.h", *SHARED_HEADERS),
-        },
+        "controller/fmu": {*("controller.h", "generated/controller_settings.h", *SHARED_HEADERS)},
         POLICY: {"policy.h", *SHARED_HEADERS},
     }
     own |= {f"hexapod/{name}" for name in public[component]}

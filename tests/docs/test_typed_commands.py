@@ -51,7 +51,7 @@ OTHERS = [line for line in readme_commands("hexapod") if line.split()[1] != "exp
 
 def test_the_readme_shows_every_command_of_the_core_but_validate() -> None:
     assert {line.split()[1] for line in OTHERS} == {
-        *("simulate", "list", "terrain", "compare", "report", "controller", "design", "examples"),
+        *("simulate", "list", "terrain", "compare", "report", "controller", "design", "examples")
     }
 
 

@@ -102,9 +102,7 @@ def kinds(names: Iterable[str]) -> set[str]:
     return {name.partition("[")[0] for name in names}
 
 
-def test_initial_dependencies_of_unknowns_are_those_of_the_description(
-    plant_library: Path,
-) -> None:
+def test_initial_dependencies_of_unknowns_are_those_of_the_description(plant_library: Path) -> None:
     """Each parameter is changed separately in both directions, since a kink may hide one."""
     names = [
         *(

@@ -7,15 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exchange_calls import (
-    INPUTS,
-    STATES,
-    UNKNOWNS,
-    Array,
-    directional,
-    fetched,
-    put_states,
-)
+from exchange_calls import INPUTS, STATES, UNKNOWNS, Array, directional, fetched, put_states
 from fmi3_plant import ARRAYS, Plant3
 from fmi_plant import ATHENA, MODEL_EXCHANGE, OK, Plant
 

@@ -11,9 +11,7 @@ from gains import PERIOD, make_gains
 
 from hexapod_cosim.controller import make_gait
 from hexapod_cosim.cosim.export.plant import export_controller
-from hexapod_cosim.cosim.interface.controller import (
-    ControllerSetup,
-)
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.sensors import MEASURED
 from hexapod_cosim.cosim.master.signals import COMMANDS

@@ -144,9 +144,7 @@ def number(variable: Any, key: str) -> float | None:
     return None if text is None else float(text)
 
 
-def test_numbers_of_variables_are_finite_and_starts_are_in_their_ranges(
-    exported: Exported,
-) -> None:
+def test_numbers_of_variables_are_finite_and_starts_are_in_their_ranges(exported: Exported) -> None:
     for variable in exported.description.modelVariables:
         assert variable.description, variable.name
         if variable.type in ("String", "Boolean", "Binary"):

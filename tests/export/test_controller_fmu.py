@@ -18,9 +18,7 @@ from gains import PERIOD, make_gains
 from hexapod_cosim.controller import make_gait, save_gains
 from hexapod_cosim.cosim.export.plant import export_controller
 from hexapod_cosim.cosim.export.validation import find_problems
-from hexapod_cosim.cosim.interface.controller import (
-    ControllerSetup,
-)
+from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.sensors import MEASURED

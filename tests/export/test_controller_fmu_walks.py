@@ -18,10 +18,7 @@ from gains import PERIOD, make_gains
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement, make_gait
 from hexapod_cosim.cosim.control.fmu_law import law_of_ours
 from hexapod_cosim.cosim.export.plant import export_controller
-from hexapod_cosim.cosim.interface.controller import (
-    ControllerSetup,
-    controller_parameters,
-)
+from hexapod_cosim.cosim.interface.controller import ControllerSetup, controller_parameters
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_block import StepError

@@ -13,11 +13,7 @@ from feed_through import FOOT, JOINT, make_feed_through
 from fmpy.ssp.ssd import read_ssd
 
 from hexapod_cosim.cosim.common.plant_files import fmi2_platform
-from hexapod_cosim.cosim.export.ssp import (
-    KINDS,
-    PREFIXES,
-    export_ssp,
-)
+from hexapod_cosim.cosim.export.ssp import KINDS, PREFIXES, export_ssp
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.models.errors import FmuError
 from tools.importers.package import run

@@ -18,12 +18,7 @@ from platform_walk import EVERYTHING
 
 from hexapod_cosim.cosim.common.plant_files import fmi_headers, source_files
 from hexapod_cosim.cosim.export import cross_build, platforms
-from hexapod_cosim.cosim.export.cross_build import (
-    TARGETS,
-    build_library,
-    find_compiler,
-    user_cache,
-)
+from hexapod_cosim.cosim.export.cross_build import TARGETS, build_library, find_compiler, user_cache
 from hexapod_cosim.models.errors import FmuError
 
 LINKER_MADE = {

@@ -23,12 +23,7 @@ from PIL import Image
 
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.folder import read_result
-from hexapod_cosim.cosim.results.recordings import (
-    read_csv,
-    read_parquet,
-    write_csv,
-    write_parquet,
-)
+from hexapod_cosim.cosim.results.recordings import read_csv, read_parquet, write_csv, write_parquet
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import HexapodError, load_robot
 from hexapod_cosim.models.ground.grid_file import surface_from_bytes

@@ -63,10 +63,7 @@ def test_environments_without_a_seed_differ_though_their_generator_was_used_befo
         second.close()
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("rewards", ["alive"]), ("terrain", "sand")],
-)
+@pytest.mark.parametrize(("name", "value"), [("rewards", ["alive"]), ("terrain", "sand")])
 def test_settings_that_are_no_tables_are_refused_by_name(name: str, value: object) -> None:
     with pytest.raises(HexapodError, match=f"{name}: .*expected a table"):
         HexapodEnv(**{name: value})  # type: ignore[arg-type]

@@ -22,11 +22,7 @@ from hexapod_cosim.extensions.identify.fitting.least_squares import (
     minimised,
     remaining_step,
 )
-from hexapod_cosim.extensions.identify.fitting.misfit import (
-    determined,
-    sharpened,
-    to_keep,
-)
+from hexapod_cosim.extensions.identify.fitting.misfit import determined, sharpened, to_keep
 from hexapod_cosim.extensions.identify.identification import QUANTILE, Estimate
 
 Array = NDArray[np.float64]

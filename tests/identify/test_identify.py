@@ -85,9 +85,7 @@ def test_the_noise_of_the_sensors_is_found_and_nothing_is_warned_of(
         assert max(each.value for each in one.fit.misfit.values()) < 1.33
 
 
-def test_a_log_says_nothing_of_limits_that_the_servos_do_not_reach(
-    found: list[Identified],
-) -> None:
+def test_a_log_says_nothing_of_limits_that_the_servos_do_not_reach(found: list[Identified]) -> None:
     for one in found:
         limits = {each.key: each for each in one.estimates if each.key.endswith("_max")}
         assert set(limits) == {"servo.torque_max", "servo.speed_max"}

@@ -15,11 +15,7 @@ from secret_robots import SEEN, Secret, secret_robot
 
 from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.extensions.identify.fitting.problem import Problem
-from hexapod_cosim.extensions.identify.identification import (
-    Identified,
-    identify,
-    make_experiment,
-)
+from hexapod_cosim.extensions.identify.identification import Identified, identify, make_experiment
 from hexapod_cosim.extensions.identify.numbers.servo import TERMS, with_friction_model
 from hexapod_cosim.extensions.identify.plant import LogPlant
 from hexapod_cosim.extensions.identify.results import open_text, warnings

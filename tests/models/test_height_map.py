@@ -44,11 +44,7 @@ def read(path: Path, **given: Any) -> Surface:
 
 @pytest.mark.parametrize(
     ("write", "name", "given"),
-    [
-        (png, "map.png", SCALES),
-        (npy, "map.npy", SCALES),
-        (grey, "map.png", SCALES),
-    ],
+    [(png, "map.png", SCALES), (npy, "map.npy", SCALES), (grey, "map.png", SCALES)],
 )
 def test_all_formats_give_the_same_map(
     write: Callable[[Path], Path], name: str, given: dict[str, float], tmp_path: Path

@@ -9,14 +9,7 @@ import numpy as np
 from gains import PERIOD, make_gains
 from native_controller import COMMANDS, NativeController, commands
 
-from hexapod_cosim.controller import (
-    BodyCommand,
-    Controller,
-    Gait,
-    Measurement,
-    Parts,
-    make_gait,
-)
+from hexapod_cosim.controller import BodyCommand, Controller, Gait, Measurement, Parts, make_gait
 from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.models import load_robot
 
@@ -136,8 +129,7 @@ def differences(
 
 def close(worst: np.ndarray) -> bool:
     print(
-        "largest differences of angle [rad], speed, torque and acceleration [servo's limit]:",
-        worst,
+        "largest differences of angle [rad], speed, torque and acceleration [servo's limit]:", worst
     )
     return bool((worst <= LIMITS).all())
 

@@ -22,11 +22,7 @@ from native_walks import (
     uneven,
 )
 
-from hexapod_cosim.controller import (
-    Controller,
-    Measurement,
-    Parts,
-)
+from hexapod_cosim.controller import Controller, Measurement, Parts
 
 NO_FALLBACK = replace(ALL_PARTS, fallback=False)
 

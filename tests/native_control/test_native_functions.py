@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 from gains import PERIOD, make_gains
 
-from hexapod_cosim.controller import (
-    LegSolver,
-    make_gait,
-)
+from hexapod_cosim.controller import LegSolver, make_gait
 from hexapod_cosim.controller.comply.support import Support
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.models import load_robot

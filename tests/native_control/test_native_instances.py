@@ -10,11 +10,7 @@ from gains import PERIOD
 from native_controller import HxControllerInput, NativeController, NativeError, commands
 from native_walks import program, setup_of
 
-from hexapod_cosim.controller import (
-    BodyCommand,
-    Measurement,
-    make_gait,
-)
+from hexapod_cosim.controller import BodyCommand, Measurement, make_gait
 from hexapod_cosim.models import load_robot
 
 

@@ -136,10 +136,7 @@ def other_cores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ct.CDLL]:
     folder, plant = tmp_path_factory.mktemp("widths"), ROOT / "plant_fmu"
     sources = [
         str(path)
-        for path in [
-            *sorted((plant / "src").rglob("*.c")),
-            plant / "generated" / "defaults.c",
-        ]
+        for path in [*sorted((plant / "src").rglob("*.c")), plant / "generated" / "defaults.c"]
     ]
     flags = [
         "-std=c11",

@@ -162,9 +162,7 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
 ]
 
 
-def test_a_foot_deeper_than_its_radius_at_the_start_is_refused_with_its_name(
-    core: ct.CDLL,
-) -> None:
+def test_a_foot_deeper_than_its_radius_at_the_start_is_refused_with_its_name(core: ct.CDLL) -> None:
     """The stance's feet have their centres 0.12 m below the torso's, and a radius of 15 mm."""
     plant = midway(core)
     stance = plant.robot.stance.copy()

@@ -22,12 +22,7 @@ from hexapod_cosim.controller.figure_style import SETTINGS
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.report import plots
 from hexapod_cosim.cosim.report.columns import MOST_ROWS, choose, pack
-from hexapod_cosim.cosim.report.figures import (
-    Figures,
-    draw_figures,
-    place_axes,
-    write_figures,
-)
+from hexapod_cosim.cosim.report.figures import Figures, draw_figures, place_axes, write_figures
 from hexapod_cosim.cosim.report.payload import as_json
 from hexapod_cosim.cosim.results.window import View
 

@@ -17,10 +17,7 @@ import pytest
 from command import Call, settings
 
 from hexapod_cosim.cosim.cli import main
-from hexapod_cosim.cosim.results.accuracy import (
-    compare_accuracy,
-    reference_scenario,
-)
+from hexapod_cosim.cosim.results.accuracy import compare_accuracy, reference_scenario
 from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch

@@ -33,14 +33,7 @@ def study_file(folder: Path, text: str) -> Path:
 def test_a_warning_says_that_no_run_walked(call: Call, athena_fmu: Path, tmp_path: Path) -> None:
     file = study_file(tmp_path, KINEMATIC + "seeds = 4\n[factors]\nfriction.mu = [0.17]\n")
     code, out, err = call(
-        "study",
-        file,
-        "-o",
-        tmp_path / "out",
-        "--fmu",
-        athena_fmu,
-        "--workers",
-        "0",
+        "study", file, "-o", tmp_path / "out", "--fmu", athena_fmu, "--workers", "0"
     )
     assert code == 0
     assert "4 x kinematic refused" in out

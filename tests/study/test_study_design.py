@@ -56,11 +56,7 @@ def test_a_list_takes_the_factors_side_by_side() -> None:
     # in a list values may be repeated
     factors = {"friction.mu": [0.3, 0.6, 0.3], "gait.name": ["tripod", "wave", "wave"]}
     study = study_of({"design": "list", "factors": factors})
-    assert points(study) == [
-        (0.3, "tripod"),
-        (0.6, "wave"),
-        (0.3, "wave"),
-    ]
+    assert points(study) == [(0.3, "tripod"), (0.6, "wave"), (0.3, "wave")]
 
 
 @pytest.mark.parametrize("design", ["latin_hypercube", "sobol"])

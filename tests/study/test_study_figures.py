@@ -148,9 +148,7 @@ def test_a_page_compares_each_control_with_the_first_one(folder: Any) -> None:
     assert all(f">to {control}</th>" in over_all for control in controls[1:])
 
 
-def test_a_page_of_one_control_has_the_files_name_without_a_title_and_no_pairs(
-    folder: Any,
-) -> None:
+def test_a_page_of_one_control_has_the_files_name_without_a_title_and_no_pairs(folder: Any) -> None:
     page = folder({**KINEMATIC, "seeds": 2, "factors": {"friction.mu": [0.3, 0.19]}})
     assert "<h1>test</h1>" in page
     assert "pair" not in page.partition("<h2>Over all runs</h2>")[2]

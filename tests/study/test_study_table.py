@@ -88,17 +88,7 @@ def test_the_command_runs_a_study_and_its_report_holds_everything(
     )
     save_gains(make_gains(load_robot("athena")), gains)
     code, told, err = call(
-        "study",
-        file,
-        "-o",
-        out,
-        "--fmu",
-        athena_fmu,
-        "--gains",
-        gains,
-        "--workers",
-        "1",
-        "--json",
+        "study", file, "-o", out, "--fmu", athena_fmu, "--gains", gains, "--workers", "1", "--json"
     )
     assert code == 0, err
     summary = json.loads(told)

@@ -59,8 +59,7 @@ def watched(page: Any) -> tuple[list[str], list[str]]:
     errors: list[str] = []
     requests: list[str] = []
     page.on(
-        "console",
-        lambda message: errors.append(message.text) if message.type == "error" else None,
+        "console", lambda message: errors.append(message.text) if message.type == "error" else None
     )
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.on("request", lambda request: requests.append(request.url))

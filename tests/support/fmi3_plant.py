@@ -72,7 +72,7 @@ class Plant3:
         texts = [None if text is None else text.encode() for text in (name, token, resources)]
         flags = [ctypes.c_bool(value) for value in (False, logging)]
         between = {
-            "CoSimulation": [ctypes.c_bool(events), ctypes.c_bool(early), None, ctypes.c_size_t(0)],
+            "CoSimulation": [ctypes.c_bool(events), ctypes.c_bool(early), None, ctypes.c_size_t(0)]
         }.get(kind, [])
         self._intermediate = intermediate
         self._update = UPDATE(self._on_update) if intermediate else None

@@ -13,10 +13,7 @@ import numpy as np
 from mirror import OK, ROOT, Real
 
 from hexapod_cosim.controller import BodyCommand, Gait, Measurement
-from hexapod_cosim.cosim.interface.controller import (
-    ControllerSetup,
-    load_controller_interface,
-)
+from hexapod_cosim.cosim.interface.controller import ControllerSetup, load_controller_interface
 from hexapod_cosim.cosim.master.loop_library import Header
 
 COMMANDS = ("angle_ref", "speed_ref", "torque_ref", "acceleration_ref")

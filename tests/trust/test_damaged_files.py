@@ -187,11 +187,7 @@ def with_material(column: int, value: float, law: float = 0.0, kind: int = SMOOT
     row[SOIL] = law
     row[column] = value
     return grid_bytes(
-        np.zeros((3, 4)),
-        cell=0.1,
-        kind=kind,
-        material=np.ones((3, 4), np.uint8),
-        table=row[None],
+        np.zeros((3, 4)), cell=0.1, kind=kind, material=np.ones((3, 4), np.uint8), table=row[None]
     )
 
 

@@ -164,10 +164,7 @@ ENDLESS = [
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="a file without an end")
 @pytest.mark.parametrize("command", ENDLESS)
 def test_a_file_without_an_end_is_refused(
-    plant_build: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    command: tuple[str, ...],
+    plant_build: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder").mkdir()

@@ -16,10 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 DOCS, EXTENSIONS = ROOT / "docs", ROOT / "extensions"
 # pages outside docs/, and files for which the site has a better page
-ELSEWHERE = {
-    ".github/CONTRIBUTING.md": "contributing.md",
-    "benchmarks/README.md": "benchmarks.md",
-}
+ELSEWHERE = {".github/CONTRIBUTING.md": "contributing.md", "benchmarks/README.md": "benchmarks.md"}
 INSTEAD = {
     "README.md": "index.md",
     "plant_fmu/interface.toml": "reference/plant.md",
