@@ -73,7 +73,8 @@ class Health(Stateful):
         load = speed / self.legs.speed_max
         low = -self.most * clamp(1.0 + load, 0.0, 1.0)
         high = self.most * clamp(1.0 - load, 0.0, 1.0)
-        reached = command.angle_ref + self.period * command.speed_ref
+        fastest = self.legs.speed_max
+        reached = command.angle_ref + self.period * clamp(command.speed_ref, -fastest, fastest)
         torque = self.stiffness * (reached - angle) + command.torque_ref - self.drag * speed
         damping, nothing = DAMPING_TIME * self.stiffness, np.zeros((LEGS, 3))
         added = np.array([nothing, -damping * speed, damping * (command.speed_ref - speed)])
