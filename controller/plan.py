@@ -122,7 +122,7 @@ class WalkPlan(Stateful):
         clock = self.paths.clock
         if self.laws is None or clock.absent.any():
             return False
-        return self.laws.laws.waits(clock.landing(self.at), held=clock.held)
+        return self.laws.laws.waits(clock.landing(self.at), waiting=clock.waiting)
 
     def _plan_afresh(self, *, waiting: bool) -> None:
         """Begins a new section at the present step, and plans the step after it.
@@ -151,7 +151,7 @@ class WalkPlan(Stateful):
         due, clock = command_changed or self.after is None, self.paths.clock
         if self.laws is not None:
             self._follow_sensors(self.laws)
-        if due or clock.held:
+        if due or clock.waiting:
             waiting = self._waits()
             if due or not waiting:
                 self._plan_afresh(waiting=waiting)

@@ -194,6 +194,8 @@ fmi2Status fmi2CancelStep(fmi2Component c) { return hx_call_not_offered(c, __fun
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[]) {
+  if (!hx_call_is_legal(c, HX_SET_INPUT_RATES)) return fmi2Error;
+  if (!hx_continuous) return hx_call_not_offered(c, __func__); /* canInterpolateInputs */
   if (!hx_call_is_first_order(c, HX_SET_INPUT_RATES, nvr, vr, order, value)) return fmi2Error;
   return hx_reply(hx_instance_set_input_rates(c, vr, nvr, value));
 }

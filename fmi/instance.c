@@ -276,8 +276,11 @@ static hxStatus check_set(hxInstance *instance, const hxVariable *variable, hxCa
   if (causality == HX_PARAMETER && !(variable->tunable && is_between_steps(instance)) &&
       !(instance->state.mode & (HX_MODE_INSTANTIATED | HX_MODE_INITIALIZATION))) {
     hx_log(instance, HX_LOG_ERROR,
-           "%s: got a value after initialisation, expected it before, as it is fixed; nothing was "
-           "set, reset first",
+           variable->tunable
+               ? "%s: got a value within a step, expected it between steps, in step mode or event "
+                 "mode, as it is a parameter; nothing was set, set it there"
+               : "%s: got a value after initialisation, expected it before, as it is fixed; "
+                 "nothing was set, reset first",
            variable->name);
     return HX_INVALID_ARGUMENT;
   }

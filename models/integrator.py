@@ -96,7 +96,7 @@ class Start:
         return METHOD[self.robot.solver.method]
 
     @property
-    def touch(self) -> float:
+    def touch_depth(self) -> float:
         """Returns the largest depth of a contact that has just touched down [m]."""
         return max(TOUCH_DEPTH[0], TOUCH_DEPTH[1] * self.robot.solver.tolerance)
 
@@ -235,7 +235,7 @@ def expected_touch(start: Start, t_low: float, low: Depths, t_high: float, high:
     """Returns the time [s] at which the first open contact reaches half the touch depth (eq. 24),
     or the first foot has left its cell by as much.
     """
-    h, level, first = t_high - t_low, 0.5 * start.touch, 1.0
+    h, level, first = t_high - t_low, 0.5 * start.touch_depth, 1.0
     for k, damping in enumerate(start.state.contacts.damping):
         if np.isnan(damping) and high.delta[k] > level:
             ends = (low.delta[k], h * low.ddelta[k], high.delta[k], h * high.ddelta[k])
@@ -260,7 +260,7 @@ def find_touchdown(start: Start, h: float, trial: Trial) -> tuple[float, Trial, 
     low, high = 0.0, h
     depths_low = depths_of(robot, start.state.body, contacts)
     depths = depths_of(robot, trial.body, contacts)
-    while deepest_open(contacts, depths) > start.touch and high - low > STEP_FLOOR:
+    while deepest_open(contacts, depths) > start.touch_depth and high - low > STEP_FLOOR:
         tried += 1
         middle = expected_touch(start, low, depths_low, high, depths) if tried % 3 else low
         if not low < middle < high:

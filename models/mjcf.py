@@ -232,18 +232,20 @@ def _torso(world: ET.Element, robot: Robot) -> None:
         box = {"name": "torso_contact", "type": "box", "size": edges, "pos": place}
         add(torso, "geom", _body_attributes(robot) | box)
     add(torso, "site", name="imu", pos=robot.torso.com)
-    for leg, mobility in zip(robot.legs, joint_mobility(robot), strict=True):
-        _leg(torso, leg, robot, mobility)
+    for k, mobility in enumerate(joint_mobility(robot)):
+        _leg(torso, k, robot, mobility)
 
 
-def _leg(torso: ET.Element, leg: Leg, robot: Robot, mobility: Array) -> None:
-    """Adds a leg; mobility (3,) of its joints [1/(kg m2)]."""
+def _leg(torso: ET.Element, k: int, robot: Robot, mobility: Array) -> None:
+    """Adds leg k; mobility (3,) of its joints [1/(kg m2)]."""
+    leg = robot.legs[k]
     body, place = torso, leg.hip_position
     quaternion = axis_quaternion(Z, leg.hip_yaw)
-    for name, link, mobile in zip(JOINT_NAMES, leg.links, mobility, strict=True):
+    links = zip(JOINT_NAMES, robot.owner_links(k), mobility, strict=True)
+    for name, (owners, link), mobile in links:
         body = add(body, "body", name=f"{leg.name}_{name}", pos=place, quat=quaternion)
         _inertial(body, link.mass, link.com, link.inertia)
-        _hinge(body, f"{leg.name}_{name}", link, robot, float(mobile))
+        _hinge(body, owners, link, robot, float(mobile))
         size = repr(THICKNESS * robot.foot.radius)
         add(
             body,
@@ -305,9 +307,8 @@ def _hinge(body: ET.Element, name: str, link: Link, robot: Robot, mobility: floa
 def _servos(root: ET.Element, robot: Robot) -> None:
     servo, actuator = robot.servo, add(root, "actuator")
     damping = servo.kd + (back_emf_damping(servo) if servo.drive == "motor" else 0.0)
-    for leg in robot.legs:
-        for name, link in zip(JOINT_NAMES, leg.links, strict=True):
-            joint = f"{leg.name}_{name}"
+    for k in range(LEGS):
+        for joint, link in robot.owner_links(k):
             position = add(actuator, "position", name=joint, joint=joint, kp=servo.kp, kv=damping)
             position.set("ctrlrange", joined((link.angle_min, link.angle_max)))
             position.set("forcerange", joined((-servo.torque_max, servo.torque_max)))
@@ -322,8 +323,9 @@ def _stance(root: ET.Element, robot: Robot) -> None:
     height = robot.foot.radius - float(np.min(feet[:, 2]))  # of the torso's frame above the plane
     place = np.array([0.0, 0.0, robot.terrain.height]) + height * rotation_matrix(tilt)[:, 2]
     key = add(add(root, "keyframe"), "key", name="stance")
-    key.set("qpos", joined([*place, *quaternion, *robot.stance.ravel()]))
-    key.set("ctrl", joined(robot.stance.ravel()))
+    angles = robot.joints.signs * robot.stance.ravel()
+    key.set("qpos", joined([*place, *quaternion, *angles]))
+    key.set("ctrl", joined(angles))
 
 
 def _ground_quaternion(robot: Robot) -> Array:

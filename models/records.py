@@ -21,7 +21,7 @@ from hexapod_cosim.models import arrays
 from hexapod_cosim.models.contact.law import Contact
 from hexapod_cosim.models.friction import Friction
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.schema import Choice, Number, Vector
+from hexapod_cosim.models.schema import Choice, Number, Texts, Vector
 
 Array = arrays.Array
 Vector3 = arrays.Vector3
@@ -72,6 +72,13 @@ class Link:
         """Position of the next joint or the foot's centre in the link frame [m]."""
         return (self.length, self.offset_y, self.offset_z)
 
+    @property
+    def turned(self) -> Link:
+        """The same link with its angle counted the other way round."""
+        x, y, z = (0.0 - value for value in self.axis)
+        low, high = -self.angle_max, -self.angle_min
+        return replace(self, axis=(x, y, z), angle_min=low, angle_max=high)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Leg:
@@ -82,6 +89,23 @@ class Leg:
     hip_yaw: Annotated[float, Number("rad", at_least=-math.pi, at_most=math.pi)]
     links: tuple[Link, Link, Link]
     stance: Annotated[Vector3, Vector("rad", 3)]  # joint angles of the standing pose
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointNames:
+    """What the owner calls the joints, legs slowest, and which of them the owner counts the other
+    way round. Files for other tools have these names and signs.
+    """
+
+    names: Annotated[tuple[str, ...], Texts()] = tuple(
+        f"{leg}_{joint}_joint" for leg in LEG_NAMES for joint in JOINT_NAMES
+    )
+    reversed: Annotated[tuple[str, ...], Texts()] = ()
+
+    @property
+    def signs(self) -> Array:
+        """Angles of the owner over those of this project (18,): 1 or -1."""
+        return np.array([-1.0 if name in self.reversed else 1.0 for name in self.names])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -308,6 +332,7 @@ class Robot:
     gait: Gait
     body: BodyContact = field(default_factory=BodyContact)
     soil: Soil = Soil()
+    joints: JointNames = field(default=JointNames(), compare=False)
     source: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @property
@@ -335,14 +360,24 @@ class Robot:
         """Upper joint limits (6, 3) [rad]."""
         return np.array([[link.angle_max for link in leg.links] for leg in self.legs])
 
+    def owner_links(self, leg: int) -> list[tuple[str, Link]]:
+        """Returns the joints' names and the links of a leg as the owner counts their angles."""
+        own = slice(3 * leg, 3 * leg + 3)
+        names, signs = self.joints.names[own], self.joints.signs[own]
+        return [
+            (name, link.turned if sign < 0.0 else link)
+            for name, sign, link in zip(names, signs, self.legs[leg].links, strict=True)
+        ]
+
     @cached_property
     def hash(self) -> str:
-        """SHA-256 in hexadecimal of all fields but `source`, a body without contact and the
-        parameters of measured servos where all have their defaults; equal robots have equal hashes.
+        """SHA-256 in hexadecimal of all fields but `joints`, `source`, a body without contact and
+        the parameters of measured servos where all have their defaults; equal robots have equal
+        hashes.
         """
         surface = self.terrain.surface if self.terrain.kind == "grid" else None
         content = _plain(asdict(replace(self, terrain=replace(self.terrain, surface=None))))
-        del content["source"], content["terrain"]["surface"]
+        del content["joints"], content["source"], content["terrain"]["surface"]
         if self.body.contact == "off":
             del content["body"]
         for name in _unused_fields(self.servo):

@@ -31,6 +31,7 @@ from hexapod_cosim.models.records import (
     LEG_NAMES,
     BodyContact,
     Foot,
+    JointNames,
     Leg,
     Link,
     Robot,
@@ -176,8 +177,8 @@ def _read_friction(
 
 def _read_section(table: Mapping[str, Any], name: str, where: str) -> Any:
     record = SECTIONS[name]
-    if record is BodyContact and name not in table:
-        return BodyContact()
+    if record in (BodyContact, JointNames) and name not in table:
+        return record()
     if record is Terrain:
         return read_terrain(_section(table, name, where), where)
     if record is Soil:  # no section: rigid ground

@@ -272,16 +272,16 @@ class Compliance(Stateful):
             return np.zeros(LEGS, dtype=np.bool_)
         return self.touching & ~self.doubted
 
-    def waits(self, landing: Mask, *, held: bool) -> bool:
+    def waits(self, landing: Mask, *, waiting: bool) -> bool:
         """Returns whether the gait clock waits for the feet of legs that end their swing (C50).
 
         It does not wait for joints that are too slow: their feet are late on level ground too.
 
-        landing: (6,) these legs; held: it waits already.
+        landing: (6,) these legs; waiting: it waits already.
         """
         if not self.parts.touchdown or self.trust.level < 1.0 or self.trust.feet_late():
             return False
-        found = self._carries() if held else self.touching
+        found = self._carries() if waiting else self.touching
         hopeful = self.touchdown.offset > -REACH_LIMIT
         return bool((landing & ~found & ~self.doubted & hopeful).any())
 

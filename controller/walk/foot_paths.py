@@ -158,31 +158,29 @@ class FootPaths(Stateful):
             feet = feet._replace(
                 goal=np.where(away, place, feet.goal), pull=np.where(away, 0.0, feet.pull)
             )
-        back, tau = cis(-feet.turn), self.clock.progress(feet.phase)
+        clock, gait = self.clock, self.gait
+        back, tau = cis(-feet.turn), clock.progress(feet.phase)
         s, slope = blend(tau)
-        feet = feet._replace(blend=np.where(self.clock.swinging, s, 0.0))
-        lift, climb = hop(
-            tau,
-            top=self.gait.step_height,
-            down=self.gait.touchdown_speed * self.swing_time,
-        )
-        was = back * (carried - feet.way)
+        lift, climb = hop(tau, top=gait.step_height, down=gait.touchdown_speed * self.swing_time)
+        folded = np.where(away, gait.step_height, 0.0)
         # 1/s    at which the feet pass through their paths
-        pace = 0.0 if self.clock.held else 1.0 / self.swing_time
-        pulled = back * feet.pull * (slope * pace)
+        pace = 0.0 if clock.waiting else 1.0 / self.swing_time
+        rise = climb * pace
+        if clock.dropped.any():
+            high = feet.height - self.home_height
+            fall = np.maximum(DROP_RATE * high, LANDING_SPEED)
+            lift = np.where(clock.dropped, np.maximum(high - fall * self.period, 0.0), lift)
+            rise = np.where(clock.dropped, -fall, rise)
         # a foot on the ground: dp/dt = -(v + i w p)
-        velocity = pulled - (feet.twist.velocity + 1j * feet.twist.yaw_rate * was)
-        dropped = self.clock.dropped & self.clock.swinging
-        high = feet.height - self.home_height
-        fall = np.maximum(DROP_RATE * high, LANDING_SPEED)
-        low = np.maximum(high - fall * self.period, 0.0)
-        lift = np.where(dropped, low, lift)
-        lift = np.where(self.clock.swinging, lift, np.where(away, self.gait.step_height, 0.0))
+        was = back * (carried - feet.way)
+        motion = feet.twist.velocity + 1j * feet.twist.yaw_rate * was
+        velocity = back * feet.pull * (slope * pace) - motion
+        feet = feet._replace(blend=np.where(clock.swinging, s, 0.0))
         return feet._replace(
             plane=back * (self._ground_of(feet) - feet.way),
-            height=self.home_height + lift,
+            height=self.home_height + np.where(clock.swinging, lift, folded),
             velocity=np.where(away, 0.0, velocity),
-            rise=np.where(self.clock.swinging, np.where(dropped, -fall, climb * pace), 0.0),
+            rise=np.where(clock.swinging, rise, 0.0),
         )
 
     def _set_out(self, now: PlannedFeet, twist: Twist) -> PlannedFeet:
@@ -326,14 +324,11 @@ class FootPaths(Stateful):
         goal = np.where(free, way + cis(turn) * self._landing(tau, twist), before.goal)
         left = np.maximum(1.0 - before.blend, NEARLY_DONE)
         pull = before.pull + (goal - before.goal) / left
-        aim = self.narrowing * self.turned
-        rolls = aim - (aim - before.rolled) * (1.0 - blend(tau)[0]) / left
-        rolled = np.where(clock.swinging & ~self.met, rolls, before.rolled)
         # a foot stays where it met the ground (C51), or is dropped
         fixed, ground = self.met | clock.dropped, self._ground_of(before)
-        goal = np.where(fixed, ground, goal)
-        pull = np.where(fixed, 0.0, pull)
-        feet = before._replace(
-            phase=phase, goal=goal, pull=pull, rolled=rolled, way=way, turn=turn, twist=twist
-        )
-        return self._place_feet(feet, ground)
+        goal, pull = np.where(fixed, ground, goal), np.where(fixed, 0.0, pull)
+        feet = before._replace(phase=phase, goal=goal, pull=pull, way=way, turn=turn, twist=twist)
+        feet = self._place_feet(feet, ground)
+        aim = self.narrowing * self.turned
+        rolls = aim - (aim - before.rolled) * (1.0 - feet.blend) / left
+        return feet._replace(rolled=np.where(clock.swinging & ~self.met, rolls, before.rolled))

@@ -28,7 +28,7 @@ class GaitClock(Stateful):
         lifted: legs that lift off at the begin of the section.
         stayed: legs that skipped their last step.
         stays: legs that will skip their next step: in their stance under a body at rest.
-        held: the clock stands still until feet at the ends of their swings carry load (scalar).
+        waiting: the clock stands still until feet at the ends of their swings carry load (scalar).
         awaited: feet that it waits for.
         ending: another gait follows: legs finish their steps and begin no other (scalar).
         offset: phases at the begin of the walk [cycles].
@@ -39,8 +39,8 @@ class GaitClock(Stateful):
     """
 
     STATE = (
-        "walking", "before", "swinging", "standing", "lifted", "stayed", "stays", "held", "awaited",
-        "ending", "offset", "late", "absent", "dropped",
+        "walking", "before", "swinging", "standing", "lifted", "stayed", "stays", "waiting",
+        "awaited", "ending", "offset", "late", "absent", "dropped",
     )  # fmt: skip
 
     def __init__(self, gait: Gait, *, period: float) -> None:
@@ -51,7 +51,7 @@ class GaitClock(Stateful):
         self.absent = self.dropped = NO_LEG
         self.late: Mask
         self.start_at(np.array(gait.offsets) + gait.start_clock())
-        self.walking, self.before, self.held, self.ending = False, 0, False, False
+        self.walking, self.before, self.waiting, self.ending = False, 0, False, False
         self.swinging = self.standing = self.lifted = self.stays = self.awaited = NO_LEG
         self.stayed: Mask = self.late
 
@@ -65,13 +65,13 @@ class GaitClock(Stateful):
 
     def stop(self) -> None:
         """Stops the clock at its begin, with all legs standing."""
-        self.walking, self.before, self.held, self.ending = False, 0, False, False
+        self.walking, self.before, self.waiting, self.ending = False, 0, False, False
         self.swinging = self.standing = self.lifted = self.stays = self.awaited = NO_LEG
         self.stayed, self.dropped = self.late, NO_LEG
 
     def start_standing(self, back: int | None) -> None:
         """Begins the walk anew with legs that all stand (C55), but for one that swings (C58)."""
-        self.before, self.held, self.ending, self.dropped = 0, False, False, NO_LEG
+        self.before, self.waiting, self.ending, self.dropped = 0, False, False, NO_LEG
         self.swinging = self.lifted = self.stays = self.awaited = NO_LEG
         self.standing, self.stayed = self._stands_after(0), self.late
         if back is not None:
@@ -91,7 +91,7 @@ class GaitClock(Stateful):
 
     def reached(self, number: int) -> int:
         """Returns the periods on the clock `number` periods after the section began (C50)."""
-        return self.before if self.held else self.before + number
+        return self.before if self.waiting else self.before + number
 
     def progress(self, phase: Array) -> Array:
         """Returns the completed parts tau of the swings (6,) at these phases (C2)."""
@@ -110,7 +110,7 @@ class GaitClock(Stateful):
         The legs in `lifted` swing from set_out() on.
         """
         self.before = self.reached(number) if self.walking else 0
-        self.held, self.awaited = False, NO_LEG
+        self.waiting, self.awaited = False, NO_LEG
         stood = self.phase_after(self.before) < self.gait.duty
         self.standing = self._stands_after(self.before + 1)
         self.lifted = stood & ~self.standing & ~self.absent
@@ -132,7 +132,7 @@ class GaitClock(Stateful):
     def drop(self) -> None:
         """Ends the swings at once; the walk ends with them (C58)."""
         self.swinging = self.swinging & ~self.absent
-        self.ending, self.dropped, self.held = True, self.swinging, False
+        self.ending, self.dropped, self.waiting = True, self.swinging, False
         self.awaited = NO_LEG
 
     def land(self, down: Mask) -> None:
@@ -160,7 +160,7 @@ class GaitClock(Stateful):
         """Begins a section in which the clock stands still (C50). number: as for landing()."""
         self.awaited = self.landing(number)
         self.before = self.reached(number)
-        self.held, self.lifted = True, NO_LEG
+        self.waiting, self.lifted = True, NO_LEG
 
     def landing(self, number: int) -> Mask:
         """Returns the legs (6,) whose swing ends at the present step.
@@ -179,11 +179,11 @@ class GaitClock(Stateful):
 
         It does if no leg lifts off or touches down before it.
         """
-        if not self.walking or self.held or number == 1:
+        if not self.walking or self.waiting or number == 1:
             return True
         stands = self._stands_after(self.before + number)
         return bool((stands == self.standing).all())
 
     def ended(self) -> bool:
         """Returns whether all legs stand and begin no other step, because another gait follows."""
-        return self.ending and not self.held and bool(self.stays.all())
+        return self.ending and not self.waiting and bool(self.stays.all())

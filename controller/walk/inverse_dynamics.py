@@ -74,7 +74,9 @@ class InverseDynamics:
         self.mass = np.array([[link.mass for link in leg] for leg in links])  # kg    (6, 3)
         self.total_mass = self.torso_mass + float(self.mass.sum())  # kg
         self.joint = legs.coxa_length + 1j * legs.coxa_height  # m    (6,) U of the femur's joint
-        self.com = com[..., 0] + 1j * com[..., 2]  # m    (6, 3) from the joint, plane of the leg
+        # m    (6, 3) from the joint, plane of the leg; of femur and tibia when they are level
+        level = np.array((np.ones(LEGS), legs.femur_zero, legs.tibia_zero)).T
+        self.com = level * (com[..., 0] + 1j * com[..., 2])
         self.side = com[..., 1] + np.cumsum(offset, axis=1) - offset  # m    (6, 3) Y
         self.yaw_inertia = inertia[..., 2].sum(axis=1)  # kg m2    (6,)
         self.pitch_inertia = inertia[..., 1]  # kg m2    (6, 3)
@@ -100,8 +102,8 @@ class InverseDynamics:
         knee = self.joint + pose.femur * legs.femur
         point = np.empty((LEGS, 3), dtype=np.complex128)
         point[:, 0] = self.com[:, 0]
-        point[:, 1] = self.joint + pose.femur * (legs.femur_zero * self.com[:, 1])
-        point[:, 2] = knee + pose.tibia * (legs.tibia_zero * self.com[:, 2])
+        point[:, 1] = self.joint + pose.femur * self.com[:, 1]
+        point[:, 2] = knee + pose.tibia * self.com[:, 2]
         aside = point.real + 1j * self.side
         place, height = posture.turn(
             legs.place[:, None] + pose.heading[:, None] * aside,

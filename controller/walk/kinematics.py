@@ -89,6 +89,8 @@ class LegSolver:
         self.offset_y = tip[:, :, 1].sum(axis=1)  # m    (6,) Y
         self.femur = np.hypot(tip[:, 1, 0], tip[:, 1, 2])  # m    (6,) a
         self.tibia = np.hypot(tip[:, 2, 0], tip[:, 2, 2])  # m    (6,) b
+        self.squares = self.femur * self.femur, self.tibia * self.tibia  # m2    (6,)
+        self.twice = 2.0 * self.femur * self.tibia  # m2    (6,)
         self.femur_tilt = np.arctan2(tip[:, 1, 2], tip[:, 1, 0])  # rad    (6,)
         self.tibia_tilt = np.arctan2(tip[:, 2, 2], tip[:, 2, 0])  # rad    (6,)
         self.femur_zero = np.exp(-1j * self.femur_tilt)  # 1    (6,)
@@ -128,7 +130,7 @@ class LegSolver:
         Args:
             plane, height: (6,) centres of the feet, x + i y and z, torso frame [m].
         """
-        a, b, side = self.femur, self.tibia, self.offset_y
+        (a2, b2), side = self.squares, self.offset_y
         point = plane - self.place
         # rho^2 = x^2 + y^2 - Y^2;  e^(i psi) = (x + i y)/(rho + i Y)
         distance2 = square(point) - side * side
@@ -136,10 +138,10 @@ class LegSolver:
         heading = point / (rho + 1j * side)
         foot = rho - self.coxa_length + 1j * (height - self.hip[2] - self.coxa_height)
         # cos gamma = (u^2 + w^2 - a^2 - b^2)/(2 a b);  e^(i B) = (u + i w)/(b + a e^(i gamma))
-        wanted = (square(foot) - a * a - b * b) / (2.0 * a * b)
+        wanted = (square(foot) - a2 - b2) / self.twice
         cosine = clamp(wanted, FOLDED_COSINE, 1.0)
         knee = cosine + 1j * np.sqrt(1.0 - cosine * cosine)
-        tibia = foot / (b + a * knee)
+        tibia = foot / (self.tibia + self.femur * knee)
         femur = tibia * knee
         angle = np.empty((*cosine.shape, 3))
         coxa, thigh = heading * self.upright, femur * self.femur_zero

@@ -71,6 +71,12 @@ GainsFile = Annotated[
         "--gains", metavar="FILE", help="Gains from `hexapod design` instead of designing them now."
     ),
 ]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers", min=1, metavar="N", help="Processes; default: one for each processor."
+    ),
+]
 Engine = Annotated[
     str | None,
     typer.Option(

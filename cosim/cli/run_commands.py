@@ -58,23 +58,20 @@ def simulate(
     """Run one co-simulation: results, metrics, plots. Several controls: a run of each. SCENARIO may
     be a package (.ssp) of a plant and a controller.
     """
+    from hexapod_cosim.cosim.cli.package import read_package
     from hexapod_cosim.cosim.cli.running import RunOptions, Words
-    from hexapod_cosim.cosim.cli.simulating import read_package, simulate_each
+    from hexapod_cosim.cosim.cli.simulating import simulate_each
     from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 
-    if scenario.endswith(".ssp"):
-        with TemporaryFolder("package") as folder:
-            package = read_package(Path(scenario), folder)
-            settings = [*package.settings, *(settings or [])]
-            return simulate(
-                "walk_flat", control or [str(package.controller)], settings, formats,
-                output or Path("out") / Path(scenario).stem, package.plant, gains, accuracy,
-                engine, json,
-            )  # fmt: skip
     given = [*(settings or []), *([f"outputs.formats={formats!r}"] if formats else [])]
     words = Words(control, given, engine=engine, fmu=fmu, gains=gains, accuracy=accuracy)
-    options = RunOptions.read(fmu=fmu, gains=gains, engine=engine, runs=1)
-    return simulate_each(scenario, words, options, output=output, as_json=json)
+    with TemporaryFolder("package") as folder:
+        package = None
+        if scenario.endswith(".ssp"):
+            package = read_package(Path(scenario), folder, given)
+        plant = fmu if fmu or package is None else package.plant
+        options = RunOptions.read(fmu=plant, gains=gains, engine=engine, runs=1)
+        return simulate_each(scenario, words, options, output=output, as_json=json, package=package)
 
 
 def compare(

@@ -1,6 +1,4 @@
-"""Runs a scenario or a System Structure package under one or several controls, for `hexapod
-simulate`.
-"""
+"""Runs a scenario or a package under one or several controls, for `hexapod simulate`."""
 
 from __future__ import annotations
 
@@ -8,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
+from hexapod_cosim.cosim.cli.package import Package
 from hexapod_cosim.cosim.cli.running import (
     RunOptions,
     Words,
@@ -22,10 +20,6 @@ from hexapod_cosim.cosim.cli.running import (
     titled,
 )
 from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_text, waiting, warn
-from hexapod_cosim.cosim.common.archives import unpack
-from hexapod_cosim.cosim.export.ssp import SSD
-from hexapod_cosim.cosim.interface.descriptions import read_description
-from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.cosim.report.tables import about_accuracy, metric_rows, with_errors
 from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.facts import Result
@@ -39,11 +33,8 @@ from hexapod_cosim.cosim.results.metric_table import has_net_slip
 from hexapod_cosim.cosim.results.summary import summarise
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.models import HexapodError, load_robot
 
-COMPONENTS = ("plant", "controller")
-COMMAND = "command."  # prefix of the controller's body command
-MOST_CHANGES = 60  # parameters: more are those of another robot
+OF_PACKAGES = "walk_flat"  # scenario that a package's settings change
 
 
 @dataclass(frozen=True)
@@ -81,14 +72,23 @@ class Simulated:
 
 
 def simulate_each(
-    name: str, words: Words, options: RunOptions, *, output: Path | None, as_json: bool
+    name: str,
+    words: Words,
+    options: RunOptions,
+    *,
+    output: Path | None,
+    as_json: bool,
+    package: Package | None = None,
 ) -> int:
     """Runs a scenario under each control and prints the results; returns the exit code.
 
-    name: of the scenario; words: of the command line; output: the folder, by default out/NAME.
-    Several controls have a folder of their own each. Raises HexapodError.
+    name: of the scenario; words: of the command line; output: the folder, by default out/NAME;
+    package: that is run instead of a scenario. Several controls have a folder of their own each.
+    Raises HexapodError.
     """
-    plan = titled(load_scenario(name, overrides=words.settings), words.settings)
+    scenario, settings = (name, []) if package is None else (OF_PACKAGES, package.settings)
+    plan = load_scenario(scenario, overrides=[*settings, *words.settings])
+    plan = titled(plan, words.settings)
     controls = chosen_controls(words.controls or [plan.control], plan)
     folder, done = output or default_folder(name), dict[str, Simulated]()
     command = words.command("simulate", name)
@@ -127,58 +127,3 @@ def _simulate(
                 runs = {label: stored_result(result)}
                 files += write_report(runs, folder.path, warn=warn, accuracies=accuracies)
     return Simulated(result, path, files, accuracies.get(label))
-
-
-@dataclass(frozen=True)
-class Package:
-    """The FMUs of a package, and the settings of a scenario that repeat its start values."""
-
-    plant: Path
-    controller: Path
-    settings: list[str]
-
-
-def read_package(path: Path, folder: Path) -> Package:
-    """Unpacks a package into a folder. Raises HexapodError for one of other components or of
-    another robot, which the loop cannot connect.
-    """
-    unpack(path, folder)
-    structure = ElementTree.parse(folder / "SystemStructure.ssd")
-    names = [one.get("name", "") for one in structure.iter(f"{{{SSD}}}Component")]
-    if sorted(names) != sorted(COMPONENTS):
-        raise HexapodError(
-            "a package that the loop cannot connect",
-            got=f"the components {', '.join(names)}",
-            expected="a plant and a controller, as of `hexapod export --ssp`",
-            fix="name them plant and controller, or run it in fmpy's simulate_ssp",
-            where=str(path),
-        )
-    plant, controller = (folder / "resources" / f"{name}.fmu" for name in COMPONENTS)
-    stops = [one.get("stopTime") for one in structure.iter(f"{{{SSD}}}DefaultExperiment")]
-    lasts = [f"duration={float(stop)!r}" for stop in stops if stop]
-    return Package(plant, controller, [*lasts, *_commands(controller), *_parameters(plant, path)])
-
-
-def _commands(controller: Path) -> list[str]:
-    """Returns the controller's body command as settings of a scenario."""
-    variables = read_description(controller).modelVariables
-    return [f"{one.name}={one.start}" for one in variables if one.name.startswith(COMMAND)]
-
-
-def _parameters(plant: Path, path: Path) -> list[str]:
-    """Returns the plant's parameters that differ from the default robot's. Raises HexapodError."""
-    own = load_interface(load_robot("athena")).by_name
-    given = {
-        one.name: float(one.start)
-        for one in read_description(plant).modelVariables
-        if one.causality == "parameter" and one.type == "Real" and one.name in own
-    }
-    changed = {name: value for name, value in given.items() if value != own[name].start}
-    if len(changed) > MOST_CHANGES:
-        raise HexapodError(
-            "a package of another robot",
-            got=f"{len(changed)} parameters that differ from those of athena",
-            fix="write a scenario with its robot; give it the FMUs by --fmu and --control",
-            where=str(path),
-        )
-    return [f"{name}={value!r}" for name, value in changed.items()]

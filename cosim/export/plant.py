@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from zipfile import ZIP_DEFLATED, ZIP_STORED
 
-from hexapod_cosim.cosim.common.components import PLANT, Component
+from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, Component
 from hexapod_cosim.cosim.common.files import atomic_path, writing_into
 from hexapod_cosim.cosim.common.plant_files import (
     FMI2_SOURCES,
@@ -143,11 +143,12 @@ def export_interface(
     fmi: int = 2,
     platforms: Iterable[str] | None = None,
     grids: Mapping[str, bytes] = NOTHING,
+    packed: Mapping[str, bytes] = NOTHING,
     bare: bool = False,
 ) -> Path:
     """Writes the FMU of a component with this interface; arguments and errors as `export_fmu`.
 
-    grids: grid files by their path in the FMU.
+    grids, packed: grid files, and binaries instead of `platforms`, by their path in the FMU.
     """
     if fmi not in FMI_VERSIONS:
         offered = ", ".join(map(str, FMI_VERSIONS))
@@ -156,7 +157,9 @@ def export_interface(
         )
     component = interface.component
     chosen = None if platforms is None else choose_platforms(platforms, fmi=fmi)
-    if chosen is None:
+    if packed:
+        binaries = dict(packed)
+    elif chosen is None:
         binaries = installed_binary(component, fmi=fmi)
     else:
         binaries = build_binaries(component_library(component), chosen, fmi=fmi)
@@ -209,9 +212,11 @@ def _sources(component: Component, fmi: int) -> dict[str, bytes]:
 
 
 def _reference(interface: Interface, members: dict[str, bytes], fmi: int) -> dict[str, bytes]:
-    """Returns reference results of a plant of FMI 2.0 that has a binary for this machine."""
-    own = f"binaries/{fmi2_platform()}/"
-    if fmi != 2 or interface.component is not PLANT or not any(own in name for name in members):
+    """Returns reference results of a plant or controller of FMI 2.0 that has a binary for this
+    machine.
+    """
+    own, known = f"binaries/{fmi2_platform()}/", (PLANT, CONTROLLER)
+    if fmi != 2 or interface.component not in known or not any(own in name for name in members):
         return {}
     with TemporaryFolder("export") as folder:
         trial = write_archive(folder / "trial.fmu", members, ZIP_STORED)

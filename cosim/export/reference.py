@@ -2,10 +2,10 @@
 
 The files are those of the FMI cross-check: NAME_in.csv, NAME_ref.csv, NAME_ref.opt. They are where
 the layered standard fmi-ls-ref (1.0.0-alpha.1, the version that the text of its tag v1.0.0-beta.1
-gives) has related files, with its manifest. The inputs (a force on the torso, two moving joints)
-are sampled at every communication step, so that results do not depend on the importer's
-interpolation. The outputs depend on the state only, so that they may be read before or after the
-next inputs are set.
+gives) has related files, with its manifest. The plant's inputs (a force on the torso, two moving
+joints) are sampled at every communication step, so that results do not depend on the importer's
+interpolation. Its outputs depend on the state only, so that they may be read before or after the
+next inputs are set. The controller's input, a constant speed, is set in initialization mode.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.cosim.master.fmu import Fmu
 
@@ -28,7 +29,8 @@ FILES = (
     ("text/csv", "ref.csv", "result", "Outputs where the FMU was packed"),
     ("text/csv", "ref.opt", "configuration", "Start, stop, step, relative tolerance"),
 )
-STEP, STEPS = 0.01, 100  # s, 1
+STOP, STEP = 1.0, 0.01  # s    the step of the plant; a controller steps by its period
+WALK = ("command.vx", 0.08)  # the controller's input [m/s]
 PUSH = 0.05  # amplitude, of the robot's weight
 SWING = 0.05  # rad, amplitude of the moving joints
 MOVED = ("LF.femur.angle_ref", "RR.coxa.angle_ref")
@@ -45,6 +47,7 @@ OUTPUTS = (
     "RM.foot.normal_force",
     "energy.kinetic",
 )
+COMMANDS = ("LF.coxa.angle_ref", "LF.femur.angle_ref", "RM.tibia.angle_ref", "RM.coxa.speed_ref")
 # relative; in NAME_ref.opt, for solvers that round differently
 TOLERANCE = 1e-6
 DIGITS = 12
@@ -53,22 +56,25 @@ DIGITS = 12
 def reference_members(interface: Interface, fmu: Path) -> dict[str, bytes]:
     """Runs an FMU of FMI 2.0 and returns the three files and their manifest by path in the archive.
 
-    interface: of the plant. Raises FmuError when it does not run.
+    interface: of the plant or a controller. Raises FmuError when it does not run.
     """
-    names = input_names()
+    is_plant = interface.component is PLANT
+    step, shown = (STEP, OUTPUTS) if is_plant else (interface.step, COMMANDS)
+    names, steps = input_names() if is_plant else WALK[:1], round(STOP / step)
     inputs = [
-        (k * STEP, *(float(f"{value:.{DIGITS}g}") for value in _moved(interface, k * STEP)))
-        for k in range(STEPS + 1)
+        (k * step, *(float(f"{value:.{DIGITS}g}") for value in values))
+        for k in range(steps + 1)
+        for values in [_moved(interface, k * step) if is_plant else WALK[1:]]
     ]
-    outputs = _run(fmu, names, inputs, OUTPUTS)
-    start = f"{FOLDER}/{interface.robot.name}"
-    options = {"StartTime": 0.0, "StopTime": STEPS * STEP, "StepSize": STEP, "RelTol": TOLERANCE}
-    lines = [f"{name},{value!r}\n" for name, value in options.items()]
+    outputs = _run(fmu, names, inputs, shown, step=step)
+    name = interface.robot.name + interface.component.suffix
+    options = {"StartTime": 0.0, "StopTime": steps * step, "StepSize": step, "RelTol": TOLERANCE}
+    lines = [f"{key},{value!r}\n" for key, value in options.items()]
     return {
-        f"{start}_in.csv": _csv(names, inputs),
-        f"{start}_ref.csv": _csv(OUTPUTS, outputs),
-        f"{start}_ref.opt": "".join(lines).encode(),
-        MANIFEST: manifest(interface.robot.name),
+        f"{FOLDER}/{name}_in.csv": _csv(names, inputs),
+        f"{FOLDER}/{name}_ref.csv": _csv(shown, outputs),
+        f"{FOLDER}/{name}_ref.opt": "".join(lines).encode(),
+        MANIFEST: manifest(name),
     }
 
 
@@ -105,20 +111,26 @@ def _moved(interface: Interface, time: float) -> tuple[float, ...]:
 
 
 def _run(
-    fmu: Path, names: Sequence[str], inputs: Sequence[Sequence[float]], outputs: Sequence[str]
+    fmu: Path,
+    names: Sequence[str],
+    inputs: Sequence[Sequence[float]],
+    outputs: Sequence[str],
+    *,
+    step: float,
 ) -> list[tuple[float, ...]]:
     """Runs the FMU under inputs; returns time and outputs at each communication point."""
-    with Fmu(fmu, name="reference") as plant:
-        plant.initialise(0.0, STEPS * STEP)
-        given, seen = plant.block(names), plant.block(outputs)
+    with Fmu(fmu, name="reference") as instance:
+        given, seen = instance.block(names), instance.block(outputs)
+        given.values[:] = inputs[0][1:]
+        instance.initialise(0.0, inputs[-1][0], given.set)
         rows = []
         for time, *values in inputs:
             seen.get()
             rows.append((time, *seen.values.tolist()))
             given.values[:] = values
             given.set()
-            if len(rows) <= STEPS:
-                plant.step(time, STEP)
+            if len(rows) < len(inputs):
+                instance.step(time, step)
     return rows
 
 

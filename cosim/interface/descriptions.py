@@ -85,7 +85,7 @@ def refuse_unsafe(path: Path) -> None:
 def _refuse_markup(archive: ZipFile, path: Path) -> None:
     """Raises FmuError for a model description with a document type, which may define entities."""
     archive.getinfo(DESCRIPTION)  # raises KeyError
-    found = _forbidden_markup(read_member(archive, DESCRIPTION))
+    found = forbidden_markup(read_member(archive, DESCRIPTION))
     if found:
         expected = "XML in UTF-8 without a document type, which might define entities"
         raise FmuError(
@@ -97,7 +97,7 @@ def _refuse_markup(archive: ZipFile, path: Path) -> None:
         )
 
 
-def _forbidden_markup(data: bytes) -> str | None:
+def forbidden_markup(data: bytes) -> str | None:
     """Returns what a document holds that is not read: a document type or another encoding."""
     if b"\0" in data or data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "another encoding than UTF-8"

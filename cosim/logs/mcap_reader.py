@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.logs import messages as ros
-from hexapod_cosim.cosim.logs.mcap_writer import ABOUT, COLUMNS, NANO
+from hexapod_cosim.cosim.logs.mcap_writer import ABOUT, COLUMNS, NANO, OURS
 from hexapod_cosim.cosim.logs.messages import require_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.models import LEG_NAMES, HexapodError
+from hexapod_cosim.models import LEG_NAMES, HexapodError, Robot
 from hexapod_cosim.models.kinematics import rotation_matrix
+from hexapod_cosim.models.records import JointNames
 
 Array = NDArray[np.float64]
 COMMAND_WORDS = ("command", "desired", "reference")  # in the name of a topic
@@ -32,8 +33,7 @@ UNIX_TIME = 10**15  # ns    later stamps are Unix times, which count from the fi
 FIELDS = ("position", "velocity", "effort")
 UNREADABLE = (ValueError, KeyError, IndexError, EOFError, struct.error)  # of damaged records
 MEASURED, COMMANDED = ("angle", "speed", "torque"), ("angle_ref", "speed_ref", "torque_ref")
-# lf_coxa -> 0: the joints are known with or without "_joint", in capitals or not
-PLACES = {label.lower().removesuffix("_joint"): k for k, label in enumerate(ros.JOINT_LABELS)}
+Places = Mapping[str, tuple[int, float]]  # of joints by their plain names, and signs
 
 
 @dataclass
@@ -44,10 +44,8 @@ class Series:
     rows: list[list[float]] = field(default_factory=list)
 
 
-def read_mcap(path: Path, *, torso_com: Sequence[float] = (0.0, 0.0, 0.0)) -> Recording:
-    """Reads our recording, or the ROS 2 topics of a robot.
-
-    torso_com: centre of mass in the torso's frame [m], for transforms.
+def read_mcap(path: Path, *, robot: Robot | None = None) -> Recording:
+    """Reads our recording, or the ROS 2 topics of a robot, whose joints have its names or ours.
 
     Raises HexapodError for a missing or damaged file, and for one without joint states.
     """
@@ -59,7 +57,7 @@ def read_mcap(path: Path, *, torso_com: Sequence[float] = (0.0, 0.0, 0.0)) -> Re
         with path.open("rb") as file:
             reader = make_reader(file)
             found = _own_recording(reader)
-        return read_topics(path, torso_com=torso_com) if found is None else found
+        return read_topics(path, robot=robot) if found is None else found
     except HexapodError:
         raise
     except FileNotFoundError as error:
@@ -92,24 +90,40 @@ def _own_recording(reader: Any) -> Recording | None:
     return Recording(names, np.array(rows, float).reshape(-1, len(names)))
 
 
-def read_topics(path: Path, *, torso_com: Sequence[float] = (0.0, 0.0, 0.0)) -> Recording:
+def read_topics(path: Path, *, robot: Robot | None = None) -> Recording:
     """Reads the ROS 2 topics of a file, ours or a robot's; arguments are those of read_mcap()."""
     from mcap.reader import make_reader  # noqa: PLC0415  an extra
     from mcap_ros2.decoder import DecoderFactory  # noqa: PLC0415
 
     series: dict[tuple[str, ...], Series] = {}
-    com = np.asarray(torso_com, float)
+    com = np.array(robot.torso.com) if robot else np.zeros(3)
+    joints = robot.joints if robot else OURS
+    places = _places(joints)
     with path.open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         known = [channel.topic for channel in _known_channels(reader)]
         if known:
             for schema, channel, message, decoded in reader.iter_decoded_messages(topics=known):
                 kind = "" if schema is None else schema.name
-                for names, stamp, values in _readings(kind, channel.topic, decoded, com):
+                for names, stamp, values in _readings(kind, channel.topic, decoded, com, places):
                     one = series.setdefault(names, Series())
                     one.times.append(stamp or message.log_time)
                     one.rows.append(values)
-    return _joined(series, path)
+    return _joined(series, path, joints.names[0])
+
+
+def _places(joints: JointNames) -> Places:
+    """Returns where a plain name stands: our names, and above them those of the robot."""
+    return {
+        _plain(name): (k, float(sign))
+        for one in (OURS, joints)
+        for k, (name, sign) in enumerate(zip(one.names, one.signs, strict=True))
+    }
+
+
+def _plain(name: str) -> str:
+    """Returns a joint's name in small letters and without "_joint"."""
+    return name.lower().removesuffix("_joint")
 
 
 def _known_channels(reader: Any) -> list[Any]:
@@ -127,10 +141,10 @@ def _known_channels(reader: Any) -> list[Any]:
 Reading = tuple[tuple[str, ...], int, list[float]]  # names of columns, time [ns], values
 
 
-def _readings(kind: str, topic: str, message: Any, com: Array) -> Iterable[Reading]:
+def _readings(kind: str, topic: str, message: Any, com: Array, places: Places) -> Iterable[Reading]:
     """Returns what a message contains; nothing where its joints or frames are not the robot's."""
     if kind == ros.JOINT_STATE:
-        return _joint_readings(topic, message)
+        return _joint_readings(topic, message, places)
     if kind == ros.WRENCH:
         return _foot_readings(topic, message)
     if kind == ros.IMU:
@@ -143,14 +157,14 @@ def _stamp(header: Any) -> int:
     return int(header.stamp.sec * NANO + header.stamp.nanosec)
 
 
-def _joint_readings(topic: str, message: Any) -> list[Reading]:
+def _joint_readings(topic: str, message: Any, known: Places) -> list[Reading]:
     commanded = any(word in topic.lower() for word in COMMAND_WORDS)
-    places = [PLACES.get(name.lower().removesuffix("_joint")) for name in message.name]
+    places = [known.get(_plain(name)) for name in message.name]
     found = []
     for quantity, key in zip(COMMANDED if commanded else MEASURED, FIELDS, strict=True):
         values, names = getattr(message, key), joint_names(quantity)
         pairs = [
-            (names[place], float(value))
+            (names[place[0]], place[1] * float(value))
             for place, value in zip(places, values, strict=False)
             if place is not None
         ]
@@ -210,15 +224,15 @@ def _pose_readings(message: Any, com: Array) -> list[Reading]:
     return found
 
 
-def _joined(series: Mapping[tuple[str, ...], Series], path: Path) -> Recording:
+def _joined(series: Mapping[tuple[str, ...], Series], path: Path, joint: str) -> Recording:
     """Returns one row for each measured joint state from the first command on."""
     base = next((one for names, one in series.items() if names[0].endswith(".angle")), None)
     if base is None:
         raise HexapodError(
             "no joint states of this robot",
             got=f"columns of {len(series)} topics",
-            expected=f"sensor_msgs/JointState with joints {ros.JOINT_LABELS[0]}, ...",
-            fix="name the joints as an exported URDF does",
+            expected=f"sensor_msgs/JointState with joints {joint}, ...",
+            fix="name the joints in the robot file: [joints] names",
             where=str(path),
         )
     # differences of integers: a Unix time in seconds as a double is exact to 0.2 us only

@@ -22,6 +22,7 @@ from hexapod_cosim.cosim.logs.messages import require_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import HexapodError
 from hexapod_cosim.models.kinematics import rotation_matrix
+from hexapod_cosim.models.records import JointNames
 
 Array = NDArray[np.float64]
 Message = dict[str, Any]
@@ -30,6 +31,7 @@ NANO = 1_000_000_000
 LAST_STAMP = 2**31  # s    ROS 2 stores seconds as int32
 UNKNOWN_COVARIANCE = [0.0] * 9  # by the definition of sensor_msgs/Imu
 NO_ESTIMATE = [-1.0, *[0.0] * 8]
+OURS = JointNames()
 ABOUT, COLUMNS = "hexapod", "columns"  # metadata: the run's facts and the names of all columns
 
 
@@ -39,6 +41,7 @@ def write_mcap(
     *,
     about: Mapping[str, str] | None = None,
     torso_com: Sequence[float] = (0.0, 0.0, 0.0),
+    joints: JointNames = OURS,
 ) -> None:
     """Writes the messages of all rows. A failed write leaves no partial file.
 
@@ -48,6 +51,7 @@ def write_mcap(
         about: texts for the file's metadata.
         torso_com: centre of mass in the torso's frame [m]; transforms are those of the frame's
             origin.
+        joints: their names and signs for the owner of the robot.
 
     Raises HexapodError without the extra `logs` and for times that ROS 2 cannot express.
     """
@@ -55,7 +59,7 @@ def write_mcap(
     from mcap_ros2.writer import Writer  # noqa: PLC0415  an extra
 
     stamps = _stamps(recording.time, path)
-    sources = list(_sources(recording, np.asarray(torso_com, float)))
+    sources = list(_sources(recording, np.asarray(torso_com, float), joints))
     definitions = {**ros.DEFINITIONS, ros.ROW: ros.row_definition(recording.names)}
     with atomic_path(path) as temporary, temporary.open("wb") as file, Writer(file) as writer:
         facts = {**(about or {}), COLUMNS: json.dumps(recording.names)}
@@ -91,7 +95,7 @@ def _stamps(time: Array, path: Path) -> list[int]:
     return [round(float(t) * NANO) for t in time]
 
 
-def _sources(recording: Recording, com: Array) -> Iterator[Source]:
+def _sources(recording: Recording, com: Array, joints: JointNames) -> Iterator[Source]:
     """Yields the topics for which the recording has columns."""
     have = set(recording.names)
     for topic, quantities in (
@@ -100,7 +104,7 @@ def _sources(recording: Recording, com: Array) -> Iterator[Source]:
     ):
         known = [set(joint_names(quantity)) <= have for quantity in quantities]
         if any(known):
-            yield _joints(recording, topic, quantities, known)
+            yield _joints(recording, topic, quantities, known, joints)
     for leg, topic in ros.FOOT_TOPICS.items():
         if set(vector_names(f"{leg}.foot.force")) <= have:
             yield _foot(recording, leg, topic)
@@ -123,19 +127,23 @@ def _rotation(quaternion: Array) -> Message:
 
 
 def _joints(
-    recording: Recording, topic: str, quantities: Sequence[str], known: Sequence[bool]
+    recording: Recording,
+    topic: str,
+    quantities: Sequence[str],
+    known: Sequence[bool],
+    joints: JointNames,
 ) -> Source:
     """Returns the source of joint states with the quantities that are known."""
     rows = len(recording.time)
     tables = [
-        recording.columns(joint_names(quantity)) if has else np.empty((rows, 0))
+        joints.signs * recording.columns(joint_names(quantity)) if has else np.empty((rows, 0))
         for quantity, has in zip(quantities, known, strict=True)
     ]
     fields = ("position", "velocity", "effort")
 
     def message(row: int, stamp: Message) -> Message:
         values = {key: table[row].tolist() for key, table in zip(fields, tables, strict=True)}
-        return {"header": _header(stamp, ""), "name": ros.JOINT_LABELS, **values}
+        return {"header": _header(stamp, ""), "name": joints.names, **values}
 
     return topic, ros.JOINT_STATE, message
 

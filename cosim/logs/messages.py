@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hexapod_cosim.cosim.common.installation import require_packages
-from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
+from hexapod_cosim.models import LEG_NAMES
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
@@ -25,8 +25,6 @@ WORLD, TORSO = "world", "torso"  # frames
 WORLD_FRAMES = (WORLD, "odom", "map")  # names of frames at rest, in files of others
 TORSO_FRAMES = (TORSO, "base_link", "base")
 FOOT_TOPICS = {leg: f"/{leg}/foot_force" for leg in LEG_NAMES}
-# the joints' names in exported URDFs, legs slowest
-JOINT_LABELS = [f"{leg}_{joint}_joint" for leg in LEG_NAMES for joint in JOINT_NAMES]
 
 _SEPARATOR = "=" * 80
 _PARTS = {

@@ -22,6 +22,7 @@ from hexapod_cosim.cosim.common.files import (
 )
 from hexapod_cosim.cosim.common.temporary import lock_folder
 from hexapod_cosim.cosim.interface.names import vector_names
+from hexapod_cosim.cosim.logs.mcap_writer import OURS
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED
 from hexapod_cosim.cosim.results.accuracy import Accuracy, accuracy_from_table
 from hexapod_cosim.cosim.results.facts import Result, RunFacts, facts_from_table
@@ -33,7 +34,7 @@ from hexapod_cosim.cosim.results.recordings import (
     write_recording,
 )
 from hexapod_cosim.cosim.results.window import View
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models import HexapodError, load_robot
 from hexapod_cosim.models.files import read_text
 
 RESULTS, PARTIAL = "results", "results.partial"  # stems of recordings
@@ -132,6 +133,7 @@ def write_result(result: Result, folder: Path) -> list[Path]:
         formats=outputs.formats,
         columns=columns,
         about=about,
+        joints=load_robot(result.scenario.robot).joints if "mcap" in outputs.formats else OURS,
         torso_com=[result.parameters.get(name, 0.0) for name in vector_names("torso.com")],
     )
     if result.completed and "csv" in outputs.formats and result.scenario.every == 1:

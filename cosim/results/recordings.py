@@ -22,7 +22,7 @@ import numpy as np
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.common.installation import has_pyarrow, require_pyarrow
 from hexapod_cosim.cosim.logs.mcap_reader import read_mcap
-from hexapod_cosim.cosim.logs.mcap_writer import check_start, write_mcap
+from hexapod_cosim.cosim.logs.mcap_writer import OURS, check_start, write_mcap
 from hexapod_cosim.cosim.logs.messages import require_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.columns import (
@@ -34,6 +34,7 @@ from hexapod_cosim.cosim.results.columns import (
 )
 from hexapod_cosim.cosim.scenario.records import default_formats
 from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models.records import JointNames
 
 COMMANDS = "commands.csv"
 
@@ -47,6 +48,7 @@ def write_recording(
     columns: Sequence[str] = ("*",),
     about: Mapping[str, Any] | None = None,
     torso_com: Sequence[float] = (0.0, 0.0, 0.0),
+    joints: JointNames = OURS,
 ) -> list[Path]:
     """Writes STEM.parquet and STEM.mcap with all columns and STEM.csv, as far as wanted; returns
     the files.
@@ -60,6 +62,7 @@ def write_recording(
         columns: patterns of the columns of the CSV file.
         about: facts of the run, texts or JSON values; metadata of all files but CSV.
         torso_com: centre of mass in the torso's frame [m], for the transforms of MCAP.
+        joints: names and signs of the robot's joints, for MCAP.
     """
     facts = _texts(about or {})
     chosen = default_formats() if formats is None else formats
@@ -68,7 +71,7 @@ def write_recording(
         if path.suffix == ".parquet":
             write_parquet(recording, path, about=facts)
         elif path.suffix == ".mcap":
-            write_mcap(recording, path, about=facts, torso_com=torso_com)
+            write_mcap(recording, path, about=facts, torso_com=torso_com, joints=joints)
         else:
             write_csv(recording.chosen(columns), path, units=True)
     return files

@@ -121,9 +121,18 @@ def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
 def _check_tunings(scenario: Scenario, interface: Interface) -> None:
     """Checks that events change tunable parameters. Raises ScenarioError."""
     tunable = [entry.name for entry in interface.variables if entry.variability == "tunable"]
+    fixed = {entry.name for entry in interface.of_causality("parameter")} - set(tunable)
     for event in scenario.tunings:
+        where = f"{scenario.where}: events"
+        if event.parameter in fixed:
+            raise ScenarioError(
+                "an event on a fixed parameter",
+                got=event.parameter,
+                expected="a tunable one: masses, inertias, gravity, contact, friction, servos",
+                fix="set it from the start, in [parameters]",
+                where=where,
+            )
         if event.parameter not in tunable:
-            where = f"{scenario.where}: events"
             raise _unknown(
                 "tunable parameter", event.parameter, tunable, "a tunable one", where=where
             )

@@ -12,7 +12,7 @@ import typer
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.cli.failures import SUCCESS
-from hexapod_cosim.cosim.cli.options import ControlNames, GainsFile, Json, Settings
+from hexapod_cosim.cosim.cli.options import ControlNames, GainsFile, Json, Settings, Workers
 from hexapod_cosim.cosim.cli.running import given_gains
 from hexapod_cosim.cosim.cli.terminal import (
     counting_bar,
@@ -28,12 +28,7 @@ from hexapod_cosim.cosim.results.folder import ResultsFolder, results_folder
 from hexapod_cosim.cosim.scenario.controls import AT, CHOOSER, Control, parse_controls
 from hexapod_cosim.cosim.scenario.records import CHOSEN, CONTROLS
 from hexapod_cosim.extensions.course import texts
-from hexapod_cosim.extensions.course.records import (
-    JUDGE,
-    SPLITS,
-    Course,
-    load_course,
-)
+from hexapod_cosim.extensions.course.records import JUDGE, SPLITS, Course, load_course
 from hexapod_cosim.extensions.course.report import write_course_report
 from hexapod_cosim.extensions.course.runs import Run, run_count, run_course
 from hexapod_cosim.extensions.course.store import FILES, read_table, write_result
@@ -45,41 +40,37 @@ BENCHMARK = "benchmark"  # kind of a folder with its result
 MAX_SEEDS = 1000
 OTHERS = tuple(name for name in CONTROLS if name != CHOOSER)
 DEFAULT = (*OTHERS, *(f"{name}{AT}{CHOSEN}" for name in OTHERS), CHOOSER)
+Split = Annotated[
+    str, typer.Option("--split", metavar="|".join(SPLITS), help="Cases to judge or to tune on.")
+]
 Cases = Annotated[
     list[str] | None,
     typer.Option("--case", metavar="NAME", help="A case or a class of the course, repeated."),
+]
+Seeds = Annotated[
+    int | None,
+    typer.Option(
+        "--seeds",
+        min=1,
+        max=MAX_SEEDS,
+        metavar="N",
+        help="Runs of each case and control; default 10.",
+    ),
+]
+Folder = Annotated[
+    Path | None, typer.Option("-o", "--output", metavar="DIR", help="Default out/benchmark.")
 ]
 
 
 def benchmark(
     controls: ControlNames = None,
-    split: Annotated[
-        str,
-        typer.Option("--split", metavar="|".join(SPLITS), help="Cases to judge or to tune on."),
-    ] = JUDGE,
+    split: Split = JUDGE,
     cases: Cases = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer seeds.")] = False,
-    seeds: Annotated[
-        int | None,
-        typer.Option(
-            "--seeds",
-            min=1,
-            max=MAX_SEEDS,
-            metavar="N",
-            help="Runs of each case and control; default 10.",
-        ),
-    ] = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            "--workers", min=1, metavar="N", help="Processes; default: one for each processor."
-        ),
-    ] = None,
+    seeds: Seeds = None,
+    workers: Workers = None,
     settings: Settings = None,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="DIR", help="Default out/benchmark."),
-    ] = None,
+    output: Folder = None,
     gains: GainsFile = None,
     json: Json = False,
 ) -> int:
@@ -94,13 +85,7 @@ def benchmark(
         split, names=cases or (), seeds=seeds, quick=quick, settings=settings or ()
     )
     check_control(course.cases[0].scenario, laws)
-    options = {
-        "control": controls,
-        "case": cases,
-        "set": settings,
-        "seeds": seeds,
-        "gains": gains,
-    }
+    options = {"control": controls, "case": cases, "set": settings, "seeds": seeds, "gains": gains}
     command = _command_line(options, split=split, quick=quick)
     with results_folder(output or Path("out") / BENCHMARK, own=FILES) as folder:
         table, content, files = _run_into(

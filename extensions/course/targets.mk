@@ -4,4 +4,4 @@ help-extensions::
 
 figures: setup
 	$(BIN)/hexapod benchmark -o out/benchmark
-	$(BIN)/python -m benchmarks.pages out/benchmark
+	$(BIN)/python -m benchmarks.course.pages out/benchmark

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from hexapod_cosim.cosim.cli.options import Json, RobotName
+from hexapod_cosim.cosim.cli.options import Json, RobotName, Workers
 from hexapod_cosim.cosim.cli.terminal import (
     show_files,
     show_json,
@@ -64,15 +64,6 @@ HoldOut = Annotated[
         help="Of bench logs: which ones are held out together, to judge a fit to the others.",
     ),
 ]
-Workers = Annotated[
-    int | None,
-    typer.Option(
-        "--workers",
-        metavar="N",
-        min=1,
-        help="Simulations at a time; default: one for each processor.",
-    ),
-]
 Folder = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/identify."),
@@ -102,11 +93,7 @@ def identify(
     own = load_robot(robot)
     if friction is not None:
         own = with_friction_model(own, friction)
-    words = ["hexapod", "identify", *map(str, logs), "--robot", robot]
-    words += [word for name in find or [] for word in ("--find", name)]
-    words += ["--friction", friction] if friction else []
-    words += ["--held-out", str(held_out)] if held_out != HELD_OUT else []
-    recorded = [read_log(path, torso_com=own.torso.com) for path in logs]
+    recorded = [read_log(path, robot=own) for path in logs]
     with results_folder(output or Path("out") / "identify", own=results.FILES) as folder:
         found = identification.identify(
             recorded,
@@ -117,7 +104,7 @@ def identify(
             progress=(lambda _text: None) if json else _show_step,
         )
         folder.begin()
-        command = shlex.join(words)
+        command = _command_line(logs, robot, find or [], friction, held_out)
         written = results.write_identified(found, robot, folder.path, command=command)
     for text in results.warnings(found):
         warn(text.removesuffix("."))
@@ -131,6 +118,17 @@ def identify(
     show_table(results.ERRORS, results.error_rows(found), right=(2, 3, 4, 5, 6))
     show_text(results.open_text(found))
     show_files(written)
+
+
+def _command_line(
+    logs: Sequence[Path], robot: str, find: Sequence[str], friction: str | None, held_out: float
+) -> str:
+    """Returns the command that repeats the identification."""
+    words = ["hexapod", "identify", *map(str, logs), "--robot", robot]
+    words += [word for name in find for word in ("--find", name)]
+    words += ["--friction", friction] if friction else []
+    words += ["--held-out", str(held_out)] if held_out != HELD_OUT else []
+    return shlex.join(words)
 
 
 def _identify_servo(

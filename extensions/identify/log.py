@@ -135,10 +135,10 @@ def input_names() -> tuple[str, ...]:
     return tuple(plant_variables("input"))
 
 
-def read_log(path: Path, *, torso_com: Sequence[float] = (0.0, 0.0, 0.0)) -> Log:
+def read_log(path: Path, *, robot: Robot | None = None) -> Log:
     """Reads a log and checks its times and commands.
 
-    torso_com: centre of mass in the torso's frame [m], for the transforms of an MCAP file.
+    robot: whose log it is, for the joints and transforms of an MCAP file.
 
     Raises LogError for a file of another kind and for unusable rows, HexapodError for one that is
     missing or damaged.
@@ -146,7 +146,7 @@ def read_log(path: Path, *, torso_com: Sequence[float] = (0.0, 0.0, 0.0)) -> Log
     readers: dict[str, Callable[[], Recording]] = {
         ".csv": lambda: read_csv(path),
         ".parquet": lambda: read_parquet(path),
-        ".mcap": lambda: read_mcap(path, torso_com=torso_com),
+        ".mcap": lambda: read_mcap(path, robot=robot),
     }
     if path.suffix.lower() not in readers:
         raise LogError(

@@ -202,7 +202,7 @@ def replay_command(
     parameters = fmu_parameters(settings or [])
     words += [word for text in settings or [] for word in ("--set", text)]
     words += ["--fmu", str(fmu)] if fmu else []
-    recorded = read_log(log, torso_com=own.torso.com)
+    recorded = read_log(log, robot=own)
     with results_folder(output or Path("out") / "replay", own=("replay.csv",)) as folder:
         with waiting("replaying the log"):
             done = replay(recorded, own, fmu=fmu, parameters=parameters)

@@ -1,10 +1,15 @@
-.PHONY: identify-campaign
+.PHONY: identify-campaign bench-servos
 help-extensions::
 	@echo "make identify-campaign  20 robots with secret numbers, identified from logs of 6 s (10 min); ROBOTS, SECONDS, AT_A_TIME; goes on with out/identification_SECONDS.csv"
+	@echo "make bench-servos  presets of servos against logs of real ones; KSCALE=FOLDER for those of K-Scale"
 
 ROBOTS ?= 20
 SECONDS ?= 6
 AT_A_TIME ?= 1
 identify-campaign: setup
-	PYTHONPATH=tests/support:tests/identify $(BIN)/python -m benchmarks.identification --robots $(ROBOTS) --seconds $(SECONDS) \
+	PYTHONPATH=tests/support:tests/identify $(BIN)/python -m benchmarks.identify.robots --robots $(ROBOTS) --seconds $(SECONDS) \
 		--workers $(AT_A_TIME) --table out/identification_$(SECONDS).csv
+
+# KSCALE=FOLDER: the raw logs of kscalelabs/sysid
+bench-servos: setup
+	$(BIN)/python -m benchmarks.identify.servos $(if $(KSCALE),--kscale $(KSCALE)) --pictures docs/images -o benchmarks/results/servos.csv

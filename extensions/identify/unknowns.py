@@ -12,7 +12,12 @@ from dataclasses import replace
 from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.extensions.identify.log import CHANNELS, SENSORS, Log
 from hexapod_cosim.extensions.identify.numbers import Unknown, section
-from hexapod_cosim.extensions.identify.numbers.bodies import com_row, gyration_row, mass_row
+from hexapod_cosim.extensions.identify.numbers.bodies import (
+    along_row,
+    com_row,
+    gyration_row,
+    mass_row,
+)
 from hexapod_cosim.extensions.identify.numbers.servo import MOTOR, SERVO
 from hexapod_cosim.models import Robot
 
@@ -26,10 +31,10 @@ BIAS = "bias."
 ROBOT = (
     *SERVO,
     mass_row(None),
-    *(com_row(None, axis, 0.01) for axis in range(3)),
+    *(com_row(axis, 0.01) for axis in range(3)),
     gyration_row(),
     *(mass_row(joint) for joint in range(3)),
-    *(com_row(joint, 0, 0.01) for joint in range(3)),
+    *(along_row(joint, 0.01) for joint in range(3)),
     section("contact.stiffness", "N/m^1.5", "contact", 1.0),
     section("contact.restitution", "1", "contact", 0.2, positive=False, low=0.0, high=1.0),
     section(

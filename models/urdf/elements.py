@@ -74,6 +74,7 @@ class UrdfJoint:
     effort: float | None  # N m
     velocity: float | None  # rad/s
     friction: float  # N m
+    damping: float  # N m s/rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +163,9 @@ def _joint(
         fix, expected = "remove <mimic>", "joints with motors of their own"
         raise RobotError(what, got=got, expected=expected, fix=fix, where=where)
     R, p, angles = origin(element, where)
+    dynamics = element.find("dynamics")
+    damping = number(dynamics, DAMPING, 0.0, where)
+    ignored[DAMPING] += moves and DAMPING in ignore and damping != 0.0
     limit, (lower, upper) = element.find("limit"), _limits(element, kind, where, ignored)
     return UrdfJoint(
         name=element.get("name", ""),
@@ -176,7 +180,8 @@ def _joint(
         upper=upper,
         effort=_optional(limit, "effort", where),
         velocity=_optional(limit, "velocity", where),
-        friction=_friction(element, where, ignore, ignored) if moves else 0.0,
+        friction=number(dynamics, "friction", 0.0, where) if moves else 0.0,
+        damping=0.0 if DAMPING in ignore or not moves else damping,
     )
 
 
@@ -219,24 +224,6 @@ def _limits(
         raise RobotError(what, got=[lower, upper], expected=expected, fix=fix, where=where)
     ignored["limits beyond half a turn"] += lower < -math.pi or upper > math.pi
     return max(lower, -math.pi), min(upper, math.pi)
-
-
-def _friction(
-    element: ET.Element, where: str, ignore: tuple[str, ...], ignored: Counter[str]
-) -> float:
-    dynamics = element.find("dynamics")
-    damping = number(dynamics, "damping", 0.0, where)
-    if damping != 0.0 and DAMPING not in ignore:
-        raise RobotError(
-            "viscous damping in a joint",
-            got=damping,
-            expected="0 N m s/rad",
-            fix='put it into servo.kd and write `ignore = ["damping"]` under [urdf] of a robot '
-            'file with file = "..."',
-            where=f"{where}: dynamics",
-        )
-    ignored[DAMPING] += damping != 0.0
-    return number(dynamics, "friction", 0.0, where)
 
 
 Fields = Mapping[str, Any]  # specifications of attributes by name

@@ -9,6 +9,7 @@ controller requires, where their axes allow it. Joints with the opposite axis ar
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,11 +42,18 @@ class FoundLeg:
 
 
 def find_legs(
-    torso: Body, origin: Array, axes: Array, *, keep_frames: bool, where: str
+    torso: Body,
+    origin: Array,
+    axes: Array,
+    *,
+    keep_frames: bool,
+    signs: Mapping[str, list[float]],
+    where: str,
 ) -> list[FoundLeg]:
     """Returns the six legs in the order LF LM LR RF RM RR. Raises RobotError.
 
-    origin (3,) and axes (3, 3): the torso's frame in the root link's.
+    origin (3,) and axes (3, 3): the torso's frame in the root link's. signs: of the angles of a
+    leg's joints in the URDF over ours where the frames are kept; by default 1.
     """
     if len(torso.branches) != len(LEG_NAMES):
         raise _not_six(torso, where)
@@ -54,7 +62,15 @@ def find_legs(
     order = _order(hips, [chain[0].joint.name for chain in chains], where)
     middle = hips.mean(axis=0)
     return [
-        _leg(name, chains[k], hips[k], hips[k] - middle, axes, keep_frames=keep_frames, where=where)
+        _leg(
+            name,
+            chains[k],
+            hips[k],
+            hips[k] - middle,
+            axes,
+            kept=signs.get(name, [1.0, 1.0, 1.0]) if keep_frames else None,
+            where=where,
+        )
         for name, k in zip(LEG_NAMES, order, strict=True)
     ]
 
@@ -114,13 +130,14 @@ def _leg(
     outwards: Array,
     axes: Array,
     *,
-    keep_frames: bool,
+    kept: list[float] | None,
     where: str,
 ) -> FoundLeg:
+    """Returns a leg. kept: signs of its joints where the frames are kept."""
     turns = [axes.T @ chain[0].rotation]  # links' axes to the torso's at angle 0
     for branch in chain[1:]:
         turns.append(turns[-1] @ branch.rotation)
-    wanted = None if keep_frames else _pattern_yaw(turns, chain, outwards)
+    wanted = None if kept else _pattern_yaw(turns, chain, outwards)
     yaw, R_HC = _yaw(chain[0], turns[0], wanted, plain=bool((axes == np.eye(3)).all()))
     turns = [R_HC, R_HC @ chain[1].rotation, R_HC @ chain[1].rotation @ chain[2].rotation]
     foot, radius = foot_of(chain[2].body)
@@ -131,10 +148,10 @@ def _leg(
     ]
     table: dict[str, Any] = {"hip_position": hip.tolist(), "hip_yaw": yaw}
     other_way = []
-    for joint, pattern, branch, R, tip in zip(
-        JOINT_NAMES, PATTERN, chain, turns, tips, strict=True
+    for joint, pattern, own, branch, R, tip in zip(
+        JOINT_NAMES, PATTERN, kept or [1.0, 1.0, 1.0], chain, turns, tips, strict=True
     ):
-        axis, sign = _axis(R @ branch.joint.axis, pattern if wanted is not None else None)
+        axis, sign = _axis(R @ branch.joint.axis, None if wanted is None else pattern, own)
         other_way += [branch.joint.name] if sign < 0.0 else []
         table[joint] = _link(branch, R, tip, axis, sign, where)
     names = tuple(branch.joint.name for branch in chain)
@@ -173,9 +190,10 @@ def _yaw(coxa: Branch, R_TC: Array, wanted: float | None, *, plain: bool) -> tup
     return yaw, axis_rotation(Z, -yaw) @ R_TC
 
 
-def _axis(axis: Array, pattern: Array | None) -> tuple[Array, float]:
+def _axis(axis: Array, pattern: Array | None, own: float) -> tuple[Array, float]:
+    """Returns a joint's axis and the sign of its angle in the URDF: `own` without a pattern."""
     if pattern is None:
-        return axis + 0.0, 1.0
+        return math.copysign(1.0, own) * axis + 0.0, own
     return pattern, 1.0 if axis @ pattern > 0.0 else -1.0
 
 

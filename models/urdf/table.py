@@ -29,6 +29,7 @@ from hexapod_cosim.models.records import (
     BodyContact,
     Foot,
     Gait,
+    JointNames,
     Leg,
     Link,
     Servo,
@@ -82,12 +83,13 @@ SECTIONS: dict[str, type[Any]] = {
     "soil": Soil,
     "gait": Gait,
     "body": BodyContact,
+    "joints": JointNames,
 }
 EXTENSION_FIELDS: dict[str, dict[str, Any]] = {
-    **{name: dict(specs(record)) for name, record in SECTIONS.items()},
+    **{name: dict(specs(record)) for name, record in SECTIONS.items() if name != "joints"},
     "terrain": terrain_specs(),
     "world": {"gravity": Vector("m/s2", 3)},
-    **{name: {"stance": Vector("rad", 3)} for name in LEG_NAMES},
+    **{name: {"stance": Vector("rad", 3), "signs": Vector("1", 3)} for name in LEG_NAMES},
 }
 
 
@@ -149,14 +151,19 @@ def urdf_table(
         urdf.extension is not None and urdf.extension.get("frames") == "ours"
     )
     root = root_body(urdf)
-    torso, legs = _found(root, urdf, options.forward, keep_frames=keep)
+    signs = {name: own[name]["signs"] for name in LEG_NAMES if "signs" in own.get(name, {})}
+    torso, legs = _found(root, urdf, options.forward, keep_frames=keep, signs=signs)
     above = merged_tables(_shaped(own), _spread(side, where or str(path)))
     table = merged_tables(merged_tables(_assumed(), _measured(urdf, torso, legs)), above)
     _refuse_footless(legs, table, urdf.where)
     assumed = [name for name in WHOLE if name not in own and name not in side]
     assumed += _complete(table, legs, urdf)
     bare = "body" not in own and "body" not in side
-    table["source"] = _source(urdf, legs, assumed, bare=bare) | dict(side.get("source", {}))
+    table["source"] = (
+        _source(urdf, legs, assumed, bare=bare)
+        | _damped(table["servo"], legs, f"{where or path}: servo.kd")
+        | dict(side.get("source", {}))
+    )
     return table
 
 
@@ -178,7 +185,7 @@ def _assumed() -> Table:
 
 
 def _found(
-    root: Body, urdf: Urdf, forward: str, *, keep_frames: bool
+    root: Body, urdf: Urdf, forward: str, *, keep_frames: bool, signs: Mapping[str, list[float]]
 ) -> tuple[Table, list[FoundLeg]]:
     """Returns the table of the torso, and the legs.
 
@@ -197,7 +204,9 @@ def _found(
         "inertia": inertia_entries(axes.T @ inertial.inertia @ axes + 0.0),
     }
     torso["size"] = _box(root, axes, torso) or equivalent_box(torso["mass"], torso["inertia"])
-    return torso, find_legs(root, origin, axes, keep_frames=keep_frames, where=urdf.where)
+    return torso, find_legs(
+        root, origin, axes, keep_frames=keep_frames, signs=signs, where=urdf.where
+    )
 
 
 def _refuse_footless(legs: list[FoundLeg], table: Table, where: str) -> None:
@@ -232,6 +241,10 @@ def _measured(urdf: Urdf, torso: Table, legs: list[FoundLeg]) -> Table:
         "torso": torso,
         "body": {},
         "legs": {leg.name: leg.table for leg in legs},
+        "joints": {
+            "names": [name for leg in legs for name in leg.joints],
+            "reversed": [name for leg in legs for name in leg.reversed],
+        },
         "servo": {},
         "foot": {},
     }
@@ -305,6 +318,15 @@ def _complete(table: Table, legs: list[FoundLeg], urdf: Urdf) -> list[str]:
     stances = assume_stances(table["legs"])
     assumed += ["stance"] if stances else []
     return assumed + [f"gait.{key}" for key in assume_gait(table["gait"], _height(table))]
+
+
+def _damped(servo: Table, legs: list[FoundLeg], where: str) -> Table:
+    """Adds the mean damping of the joints to kd, in place; returns the note about it."""
+    damping = float(np.mean([branch.joint.damping for leg in legs for branch in leg.servo]))
+    if damping == 0.0 or "kd" not in servo:
+        return {}
+    servo["kd"] = Number("N m s/rad").read(servo["kd"], where) + damping
+    return {"URDF, damping": f"of the joints, added to servo.kd: {damping:.6g} N m s/rad"}
 
 
 def _unify(table: Table, legs: list[FoundLeg], urdf: Urdf) -> None:

@@ -41,8 +41,8 @@ def robot_to_urdf(robot: Robot) -> str:
     for name, colour in COLOURS.items():
         add(add(root, "material", name=name), "color", rgba=colour)
     _torso(root, robot)
-    for leg in robot.legs:
-        _leg(root, leg, robot)
+    for k, leg in enumerate(robot.legs):
+        _leg(root, leg, robot, robot.owner_links(k))
     _extension(root, robot)
     return written(root)
 
@@ -59,14 +59,15 @@ def _torso(root: ET.Element, robot: Robot) -> None:
         add(collision, "box", size=edges)
 
 
-def _leg(root: ET.Element, leg: Leg, robot: Robot) -> None:
+def _leg(root: ET.Element, leg: Leg, robot: Robot, links: list[tuple[str, Link]]) -> None:
+    """Adds a leg. links: with the names of their joints, as the owner counts the angles."""
     parent, place, yaw = "torso", leg.hip_position, leg.hip_yaw
-    for name, link in zip(JOINT_NAMES, leg.links, strict=True):
+    for name, (owners, link) in zip(JOINT_NAMES, links, strict=True):
         child = f"{leg.name}_{name}"
         limb = _limb(root, child, link, THICKNESS * robot.foot.radius)
         if name == "tibia" and robot.body.contact == "on":
             _tibia_spheres(limb, link, robot.body)
-        joint = _joint(root, f"{child}_joint", "revolute", parent, child)
+        joint = _joint(root, owners, "revolute", parent, child)
         add(joint, "origin", xyz=place, rpy=(0.0, 0.0, yaw))
         add(joint, "axis", xyz=link.axis)
         limit = add(joint, "limit", lower=link.angle_min, upper=link.angle_max)
@@ -152,8 +153,8 @@ def _extension(root: ET.Element, robot: Robot) -> None:
             _terrain(own, record)
             continue
         add(own, name, {key: text(getattr(record, key)) for key in specs(type(record))})
-    for leg in robot.legs:
-        add(own, leg.name, stance=leg.stance)
+    for leg, signs in zip(robot.legs, robot.joints.signs.reshape(-1, 3), strict=True):
+        add(own, leg.name, stance=leg.stance, signs=signs.tolist())
 
 
 def _terrain(own: ET.Element, terrain: Terrain) -> None:

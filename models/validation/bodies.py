@@ -168,6 +168,15 @@ def check_robot(robot: Robot, *, where: str | None = None) -> None:
     for leg in robot.legs:
         check_leg(leg, f"{at}legs.{leg.name}")
     check_stance(robot, at)
+    names, count = set(robot.joints.names), len(robot.joints.names)
+    if not count == len(names) == 18 or not names.issuperset(robot.joints.reversed):
+        raise RobotError(
+            "wrong names of joints",
+            got=f"{count} names, {len(names)} of them different",
+            expected="18 from LF to RR, coxa, femur and tibia of each, and reversed ones of these",
+            fix="give all of them, or leave [joints] out",
+            where=f"{at}joints",
+        )
 
 
 def check_settings(robot: Robot, *, where: str | None = None) -> None:

@@ -38,13 +38,14 @@ static double log_of_ratio(double s) {
   return 2.0 * s * sum;
 }
 
-double hx_log1p(double x) {
+double hx_ln(double x) {
   const double ln2 = 0.6931471805599453;
   int exponent;
-  if (fabs(x) < 0.25) return log_of_ratio(x / (2.0 + x));
-  double m = frexp(1.0 + x, &exponent);
+  double m = frexp(x, &exponent);
   if (m < 0.7071067811865476) m *= 2.0, exponent--;
   return exponent * ln2 + log_of_ratio((m - 1.0) / (m + 1.0));
 }
+
+double hx_log1p(double x) { return fabs(x) < 0.25 ? log_of_ratio(x / (2.0 + x)) : hx_ln(1.0 + x); }
 
 double hx_pow(double x, double y) { return hx_lanes_pow(x, y); }

@@ -11,7 +11,8 @@ HX_HIDDEN_BEGIN
  * for |x| >= 1e9. */
 void hx_sin_cos(double x, double *sine, double *cosine);
 
-/* Returns ln(1 + x), x > -1, to a few units in the last place. */
+/* Return ln(x), x > 0, and ln(1 + x), x > -1, to a few units in the last place. */
+double hx_ln(double x);
 double hx_log1p(double x);
 
 /* Returns x^y to a few units in the last place, x >= 0 and |y| <= 16. Numbers below the least

@@ -211,7 +211,7 @@ def test_a_foot_in_the_air_is_awaited_unless_joints_are_too_slow_for_a_fifth_of_
     for k in range(600):
         plan(laws, standing="110111", overspeed=k % 10 < round(10 * share))
         laws.feel(force)
-    assert laws.waits(landing, held=False) is awaited
+    assert laws.waits(landing, waiting=False) is awaited
 
 
 # Tests how compliant control uses its sensors: axes of forces, positions of feet, wrong sensors.

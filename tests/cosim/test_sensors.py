@@ -1,6 +1,6 @@
 """Errors of sensors and servos, and lost commands, on a plant whose true values are known.
 
-Both loops call the same functions in C; test_walker.py compares whole walks of both loops.
+Both loops call the same functions in C; test_runner.py compares whole walks of both loops.
 """
 
 from __future__ import annotations
@@ -248,7 +248,11 @@ def test_the_last_command_stays_while_commands_are_lost_but_for_the_first(lost: 
         ("{time=1, sensor='angle', leg='LF', fault='dead'}", "joint"),
         ("{time=1, duration=1, lost='all'}", "'all'"),
         ("{time=1, leg='LF', joint='all', fault='weak', share=2}", "share"),
-        ("{time=1, parameter='foot.radius', value=0.02}", "tunable parameter"),
+        (
+            "{time=1, parameter='foot.radius', value=0.02}",
+            "an event on a fixed parameter: got 'foot.radius'",
+        ),
+        ("{time=1, parameter='servo.kpp', value=40}", "did you mean 'servo.kp'"),
         ("{time=1, sensor='attitude', fault='noisy'}", "'noisy'"),
     ],
 )

@@ -33,7 +33,7 @@ SLOPE = 0.15
 def test_a_robot_walks_for_a_minute_at_the_commanded_speed_without_falling(
     robot: str, control: str
 ) -> None:
-    """On the loop in C; its walks are those of the Python loop (test_walker.py)."""
+    """On the loop in C; its walks are those of the Python loop (test_runner.py)."""
     scenario = load_scenario(
         "walk_flat", overrides=[f"robot={robot}", f"control={control}", "duration=60"]
     )

@@ -24,6 +24,7 @@ CORE_COMMANDS = {
     *("export", "simulate", "compare", "design", "report", "controller", "examples", "validate"),
     *("terrain", "list"),
 }
+PLACES = ("extensions", "tests", "benchmarks", "docs", "examples")  # of folders of an extension
 WHOLE = os.environ.get("HEXAPOD_EXTENSIONS") == "all"
 # runs the command of a tree whose package is in the folder LINKS, not the installed one
 BOOT = """
@@ -36,11 +37,11 @@ sys.exit(main(sys.argv[1:]))
 
 
 def tree_without(extension: str, place: Path) -> Path:
-    """Copies the tracked files but those of an extension and its tests; returns the copy."""
+    """Copies the tracked files but those of an extension; returns the copy."""
     listed = subprocess.run(
         ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout.split("\0")
-    left_out = (f"extensions/{extension}/", f"tests/{extension}/")
+    left_out = tuple(f"{place}/{extension}/" for place in PLACES)
     for name in listed:
         if name and not name.startswith(left_out) and (ROOT / name).is_file():
             (place / name).parent.mkdir(parents=True, exist_ok=True)
@@ -83,11 +84,13 @@ def test_every_extension_is_tried() -> None:
     assert folders - {"__pycache__"} == set(COMMANDS)
 
 
-def test_tests_of_the_core_import_no_extension() -> None:
-    for path in (ROOT / "tests").rglob("*.py"):
-        room = path.relative_to(ROOT / "tests").parts[0]
-        others = {f"hexapod_cosim.extensions.{name}." for name in COMMANDS if name != room}
-        found = [name for name in imported(path) if any(name.startswith(one) for one in others)]
+def test_only_its_own_folders_import_an_extension() -> None:
+    """These are deleted with it; tests/docs/test_layers.py judges the package's other folders."""
+    files = [path for place in (*PLACES, "tools") for path in (ROOT / place).rglob("*.py")]
+    for path in files:
+        own = path.relative_to(ROOT).parts[1]
+        others = tuple(f"hexapod_cosim.extensions.{name}." for name in COMMANDS if name != own)
+        found = [name for name in imported(path) if name.startswith(others)]
         assert not found, f"{path.relative_to(ROOT)} imports {found}"
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterator
+from functools import partialmethod
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,11 @@ import pytest
 from exchange_calls import LEGS, ROUNDING, STATES, fetched, put_states, solved_by_cvode
 from fmi_plant import ATHENA, DISCARD, ERROR, MODEL_EXCHANGE, OK, Plant
 from fmpy import simulate_fmu
+from fmpy.sundials import CVodeSolver
+from fmpy.util import read_csv
+
+from hexapod_cosim import simulate
+from hexapod_cosim.cosim.results.recordings import write_commands
 
 INDICATORS = 50
 
@@ -272,3 +278,24 @@ def test_contacts_of_bodies_and_legs_are_events_of_the_importer(
     assert float(ours["energy.contact_loss"][-1]) > 1e-3
     assert abs(float(theirs["energy.residual"][-1])) < 1e-3 * lost
     assert float(theirs["energy.dissipated"][-1]) == pytest.approx(lost, rel=2e-2)
+
+
+def test_the_page_says_how_fmpy_takes_more_steps_than_500(
+    athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A walk at a tolerance of 1e-8 needs more of them between outputs every 5 ms."""
+    walk = simulate("walk_flat", "kinematic", settings={"duration": 0.05}).recording
+    write_commands(walk, tmp_path / "commands.csv")
+    asked: dict[str, Any] = {
+        "stop_time": 0.05,
+        "output_interval": 0.005,
+        "relative_tolerance": 1e-8,
+    }
+    asked |= {"fmi_type": "ModelExchange", "input": read_csv(tmp_path / "commands.csv")}
+    with pytest.raises(RuntimeError, match="mxstep steps taken"):
+        simulate_fmu(str(athena_fmu), **asked)
+    page = (Path(__file__).parents[2] / "docs" / "howto" / "fmi.md").read_text(encoding="utf-8")
+    assert "partialmethod(CVodeSolver.__init__, maxNumSteps=100_000)" in " ".join(page.split())
+    more = partialmethod(CVodeSolver.__init__, maxNumSteps=100_000)
+    monkeypatch.setattr(CVodeSolver, "__init__", more)
+    assert simulate_fmu(str(athena_fmu), **asked)["time"][-1] == pytest.approx(0.05, abs=1e-12)

@@ -73,10 +73,12 @@ def test_a_step_that_returns_early_on_request_goes_on_bit_for_bit(plant_library:
 
 def test_inputs_may_be_set_in_an_update_and_nothing_else(plant_library: Path) -> None:
     refused: list[int] = []
+    texts: list[str] = []
 
     def push(_: float) -> None:
         assert plant.set({"torso.push_force": [30.0, 0.0, 0.0]}) == OK
         refused.append(plant.set({"torso.mass": 3.0}))
+        texts.append(plant.last_message)
         refused.append(plant.step(0.0, H).status)
         refused.append(plant.call("fmi3Terminate"))
 
@@ -85,6 +87,7 @@ def test_inputs_may_be_set_in_an_update_and_nothing_else(plant_library: Path) ->
         for k in range(STEPS // 2):
             assert plant.step(k * H, H).status == OK
         assert set(refused) == {ERROR}
+        assert "torso.mass: got a value within a step, expected it between steps" in texts[0]
         assert plant.get("torso.velocity")[0][0] > 0.1
 
 

@@ -31,9 +31,36 @@ DIFFERENCE = 2e-6  # relative to the largest of its kind: of differences of orde
 COLUMNS = 1e-12  # relative: rounding of sums
 
 
-def walking(library: Path) -> Plant:
-    """Returns an instance in event mode that stands with speeds on all joints."""
-    plant = Plant(library, kind=MODEL_EXCHANGE).initialize()
+# a motor with measured friction and a battery
+MOTOR = {
+    "servo.voltage": 12.0, "servo.duty_max": 0.12, "servo.torque_constant": 1.3,
+    "servo.resistance": 2.4, "servo.viscous_friction": 0.05, "servo.stribeck_friction": 0.1,
+    "servo.stribeck_speed": 0.04, "servo.stribeck_exponent": 1.4, "servo.supply_resistance": 0.2,
+    "servo.derate_temperature": 320.0, "servo.start_temperature": 330.0,
+    "servo.winding_capacity": 5.0, "servo.housing_capacity": 50.0,
+}  # fmt: skip
+OF_MOTOR = (
+    "servo.kp", "servo.voltage", "servo.duty_max", "servo.torque_constant", "servo.resistance",
+    "servo.stribeck_friction", "servo.stribeck_speed", "servo.stribeck_exponent",
+    "servo.supply_resistance", "servo.derate_temperature", "LF.femur.angle_ref",
+)  # fmt: skip
+LOADS = (
+    "servo.motor_load_friction", "servo.external_load_friction",
+    "servo.stribeck_motor_load_friction", "servo.stribeck_external_load_friction",
+    "servo.quadratic_motor_friction", "servo.quadratic_external_friction",
+)  # fmt: skip
+
+
+def walking(library: Path, *, start: dict[str, float] | None = None) -> Plant:
+    """Returns an instance in event mode that stands with speeds on all joints; start: of a motor's
+    servos.
+    """
+    plant = Plant(library, kind=MODEL_EXCHANGE)
+    if start:
+        drive = ATHENA.references(["servo.drive"])
+        assert plant.set_references("fmi2SetInteger", drive, [2]) == OK
+        assert plant.set_reals(start) == OK
+    plant.initialize()
     assert plant.call("fmi2NewDiscreteStates", ctypes.create_string_buffer(64)) == OK
     assert plant.call("fmi2EnterContinuousTimeMode") == OK
     rng, x = np.random.default_rng(4), fetched(plant, "fmi2GetContinuousStates", len(STATES))
@@ -67,6 +94,39 @@ def test_derivatives_by_parameters_are_the_limits_of_differences(
     found = (ends[0] - ends[1]) / (2.0 * h)
     size = np.abs(ends[0]) / (abs(value) or 1.0) * 1e-6 + np.abs(found).max() * DIFFERENCE
     assert np.all(np.abs(exact - found) <= size)
+    assert np.abs(exact).max() > 0.0
+
+
+@pytest.mark.parametrize("name", OF_MOTOR)
+def test_derivatives_by_a_motor_s_numbers_and_commands_are_the_limits_of_differences(
+    plant_library: Path, name: str
+) -> None:
+    plant = walking(plant_library, start=MOTOR)
+    x, value = fetched(plant, "fmi2GetContinuousStates", len(STATES)), plant.real(name)
+    status, exact = directional(plant, SHOWN, [name], [1.0])
+    assert status == OK, plant.last_message
+    h = 1e-5 * abs(value)
+    ends = [shown_at(plant, name, value + sign * h, x) for sign in (1.0, -1.0)]
+    found = (ends[0] - ends[1]) / (2.0 * h)
+    size = np.abs(ends[0]) / abs(value) * 1e-6 + np.abs(found).max() * DIFFERENCE
+    assert np.all(np.abs(exact - found) <= size)
+    assert np.abs(exact).max() > 0.0
+    voltage = SHOWN.index("supply.voltage")
+    assert exact[voltage] == pytest.approx(found[voltage], rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", LOADS)
+def test_a_share_of_load_that_is_0_has_the_derivative_of_one_that_rises(
+    plant_library: Path, name: str
+) -> None:
+    plant = walking(plant_library, start=MOTOR)
+    x = fetched(plant, "fmi2GetContinuousStates", len(STATES))
+    assert plant.real(name) == 0.0
+    exact = directional(plant, SHOWN, [name], [1.0])[1]
+    h = 1e-4
+    ends = [shown_at(plant, name, k * h, x) for k in range(3)]
+    found = (4.0 * ends[1] - 3.0 * ends[0] - ends[2]) / (2.0 * h)
+    assert np.all(np.abs(exact - found) <= np.abs(ends[0]) * 1e-6 + np.abs(found).max() * 1e-6)
     assert np.abs(exact).max() > 0.0
 
 

@@ -163,6 +163,18 @@ def test_saved_restored_and_serialised_states_continue_bit_for_bit(
         np.testing.assert_array_equal(walk(other, 123, 150), rest)
 
 
+def test_commands_are_steps_so_derivatives_of_inputs_are_refused(fmu: Fmu) -> None:
+    assert not fmu.description.coSimulation.canInterpolateInputs
+    fmu.initialise(0.0, 1.0)
+    reference = fmu.references(["command.vx"])
+    with pytest.raises(Exception, match="fmi2SetRealInputDerivatives failed"):
+        fmu._slave.setRealInputDerivatives(reference, [1], [0.1])
+    assert fmu._log[-1] == (
+        "fmi2SetRealInputDerivatives: got a call, expected none, as the model description does not "
+        "offer it"
+    )
+
+
 @pytest.mark.parametrize(
     ("values", "said"),
     [

@@ -18,10 +18,18 @@ import pytest
 from fmi_plant import ATHENA
 from PIL import Image
 
-from hexapod_cosim.cosim.export.plant import ICON_SIZE, PICTURE_SIZE, export_fmu, pictures
-from hexapod_cosim.cosim.export.reference import FOLDER, MANIFEST, OUTPUTS
+from hexapod_cosim.cosim.export.plant import (
+    ICON_SIZE,
+    PICTURE_SIZE,
+    export_controller,
+    export_fmu,
+    pictures,
+)
+from hexapod_cosim.cosim.export.reference import COMMANDS, FOLDER, MANIFEST, OUTPUTS
 from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.cosim.interface.terminals import render_terminals
+from hexapod_cosim.cosim.run.plan import make_setup
+from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.models import list_robots, load_robot
 
 ROUNDING = (
@@ -34,14 +42,20 @@ def exported(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return export_fmu(load_robot("athena"), tmp_path_factory.mktemp("extras") / "athena.fmu")
 
 
-@pytest.mark.parametrize("robot", list_robots())
+@pytest.mark.parametrize("robot", [*list_robots(), *CONTROLS])
 def test_an_importer_gets_the_reference_results(
     plant_build: Path, tmp_path: Path, robot: str
 ) -> None:
-    fmu = export_fmu(load_robot(robot), tmp_path / f"{robot}.fmu")
+    fmu, name, outputs = tmp_path / f"{robot}.fmu", robot, list(OUTPUTS)
+    if robot in CONTROLS:
+        setup = make_setup(load_robot("athena"), control=robot, period=0.004)
+        export_controller(setup, fmu)
+        name, outputs = "athena_controller", list(COMMANDS)
+    else:
+        export_fmu(load_robot(robot), fmu)
     with zipfile.ZipFile(fmu) as archive:
         files = [
-            archive.extract(f"{FOLDER}/{robot}_{part}", tmp_path)
+            archive.extract(f"{FOLDER}/{name}_{part}", tmp_path)
             for part in ("in.csv", "ref.csv", "ref.opt")
         ]
     options = fmpy.util.read_ref_opt_file(files[2])
@@ -49,13 +63,14 @@ def test_an_importer_gets_the_reference_results(
     result = fmpy.simulate_fmu(
         str(fmu),
         input=inputs,
-        output=list(OUTPUTS),
+        output=outputs,
         start_time=options["StartTime"],
         stop_time=options["StopTime"],
         output_interval=options["StepSize"],
     )
+    assert options["StopTime"] == 1.0
     reference = fmpy.util.read_csv(files[1])
-    for name in ("time", *OUTPUTS):
+    for name in ("time", *outputs):
         assert result[name] == pytest.approx(
             np.array(reference[name]), rel=ROUNDING, abs=ROUNDING
         ), name

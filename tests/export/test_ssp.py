@@ -12,7 +12,6 @@ import pytest
 from feed_through import FOOT, JOINT, make_feed_through
 from fmpy.ssp.ssd import read_ssd
 
-from hexapod_cosim.cosim.cli.simulating import read_package
 from hexapod_cosim.cosim.common.plant_files import fmi2_platform
 from hexapod_cosim.cosim.export.ssp import (
     KINDS,
@@ -20,7 +19,7 @@ from hexapod_cosim.cosim.export.ssp import (
     export_ssp,
 )
 from hexapod_cosim.cosim.interface.descriptions import read_description
-from hexapod_cosim.models.errors import FmuError, HexapodError
+from hexapod_cosim.models.errors import FmuError
 from tools.importers.package import run
 
 STEP, STEPS = 0.005, 60  # s
@@ -131,21 +130,3 @@ def test_components_that_share_no_names_are_refused(controller: Path, tmp_path: 
             stop=STOP,
         )
     assert not list(tmp_path.iterdir())
-
-
-def test_a_package_is_read_as_fmus_and_settings_of_a_run(
-    fmus: dict[str, Path], package: Path, tmp_path: Path
-) -> None:
-    found = read_package(package, tmp_path)
-    assert found.plant.read_bytes() == fmus["plant"].read_bytes()
-    assert found.controller.read_bytes() == fmus["controller"].read_bytes()
-    assert found.settings == ["duration=0.3"]  # the values are the default robot's
-
-
-def test_a_package_of_other_components_is_refused_with_what_it_has(
-    fmus: dict[str, Path], tmp_path: Path
-) -> None:
-    other = dict(zip(("robot", "brain"), fmus.values(), strict=True))
-    path = pack(tmp_path, other)
-    with pytest.raises(HexapodError, match=r"robot, brain.*expected a plant and a controller"):
-        read_package(path, tmp_path)

@@ -14,8 +14,11 @@ import fmpy
 import numpy as np
 import pytest
 
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
+from hexapod_cosim.models import load_robot
+from tools.importers.capabilities import adjoint, tuned, updated
 from tools.importers.compare import ROUND_OFF, largest_difference
 from tools.importers.walk import STEP, Walk, record
 
@@ -141,3 +144,11 @@ def test_the_c_importer_reports_missing_files(
     )
     assert done.returncode == 1
     assert said in done.stderr
+
+
+def test_fmpy_tunes_is_told_between_and_gets_adjoint_derivatives(
+    plant_build: Path, walk: Walk, tmp_path: Path
+) -> None:
+    fmu3 = export_fmu(load_robot("athena"), tmp_path / "athena.fmu", fmi=3)
+    for found in (tuned(walk.fmu, fmu3), updated(fmu3), adjoint(fmu3)):
+        assert found.agrees, found

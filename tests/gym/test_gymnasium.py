@@ -46,7 +46,7 @@ def test_observations_are_within_finite_bounds_also_when_scales_are_large() -> N
 
 
 def test_the_environment_of_the_example_passes_the_checks_of_gymnasium() -> None:
-    example = runpy.run_path(str(ROOT / "examples" / "learning" / "ppo.py"))
+    example = runpy.run_path(str(ROOT / "examples" / "gym" / "ppo.py"))
     env = example["make_env"]()
     try:
         check_env(env.unwrapped)

@@ -196,6 +196,16 @@ BAD: list[tuple[str, Callable[[Table], None], list[str]]] = [
         lambda t: put(t, "servo.torque_continuous", 7.0),
         ["servo.torque_continuous", "torque_max = 6"],
     ),
+    (
+        "joints' names",
+        lambda t: t.update(joints={"names": ["hip"] * 18}),
+        ["joints", "18 names, 1 of them", "give all of them, or leave [joints] out"],
+    ),
+    (
+        "reversed joints",
+        lambda t: t.update(joints={"reversed": ["hip"]}),
+        ["joints", "reversed ones of these"],
+    ),
 ]
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from disguised_urdf import random_robot
+from foreign_urdf import spider_urdf
 
 from hexapod_cosim.cosim.cli.exporting import FORMATS, export_description
 from hexapod_cosim.models import LEG_NAMES, Robot, foot_positions, list_robots, load_robot
@@ -154,6 +155,41 @@ def test_the_exported_file_loads_as_viewers_load_it(robot: Robot, tmp_path: Path
         geometry.geometry.computeLocalAABB()
         assert geometry.geometry.aabb_radius > 0.0
         assert geometry.meshPath in {"BOX", "CYLINDER", "SPHERE"}
+
+
+def test_exported_files_have_the_names_and_signs_of_the_owners_urdf(tmp_path: Path) -> None:
+    """The same angles by name bend the legs alike in the owner's URDF, in ours and in the MJCF."""
+    (tmp_path / "spider.urdf").write_text(spider_urdf(), encoding="utf-8")
+    robot = load_robot(tmp_path / "spider.urdf")
+    assert robot.joints.names[:3] == ("j_c3", "j_f3", "j_t3")
+    again = load_robot(export_description(robot, tmp_path / "again.urdf", FORMATS["urdf"]))
+    assert (again, again.joints) == (robot, robot.joints)
+    angle = dict(zip(robot.joints.names, 0.1 + 0.02 * np.arange(18), strict=True))
+    shins = []
+    for path in ("spider.urdf", "again.urdf"):
+        model = pin.buildModelFromUrdf(str(tmp_path / path), pin.JointModelFreeFlyer())
+        data, q = model.createData(), pin.neutral(model)
+        joints = [model.getJointId(name) for name in robot.joints.names]
+        q[[model.joints[joint].idx_q for joint in joints]] = list(angle.values())
+        pin.forwardKinematics(model, data, q)
+        places = np.array([data.oMi[joint].translation for joint in joints]).reshape(6, 3, 3)
+        shins.append(places[:, 2] - places[:, 0])
+        low, high = model.lowerPositionLimit, model.upperPositionLimit
+        limits = [(low[k], high[k]) for k in (model.joints[joint].idx_q for joint in joints)]
+        shins.append(np.array(limits))
+    assert_same(shins[2], shins[0], 1e-4)  # the owner's quarter turns are printed as 1.5708
+    assert_same(shins[3], shins[1], EXACT)
+    model = mujoco.MjModel.from_xml_string(robot_to_mjcf(robot))
+    data = mujoco.MjData(model)
+    for name, value in angle.items():
+        data.joint(name).qpos[0] = value
+    mujoco.mj_forward(model, data)
+    places = np.array([data.joint(name).xanchor for name in angle]).reshape(6, 3, 3)
+    assert_same(places[:, 2] - places[:, 0], shins[2], EXACT)
+    assert [tuple(model.actuator(name).ctrlrange) for name in angle] == list(map(tuple, shins[1]))
+    assert robot.joints.signs.tolist() == [1.0] * 9 + [-1.0] * 9  # the right legs' axes
+    stance = [*robot.stance[:3].ravel(), *-robot.stance[3:].ravel()]
+    assert model.key("stance").ctrl.tolist() == stance
 
 
 def their_mass_matrix(model: Any, data: Any) -> Array:

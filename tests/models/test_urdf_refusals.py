@@ -37,11 +37,6 @@ CASES: dict[str, tuple[str, str, list[str]]] = {
         '<axis xyz="0 0 2"/><mimic joint="j_f1"/>',
         ["joint 'j_t1'", "follows", "j_f1", "<mimic>"],
     ),
-    "damping": (
-        '<dynamics friction="0.04"/>',
-        '<dynamics damping="0.1"/>',
-        ["joint 'j_f1'", "viscous damping", "got 0.1", "servo.kd"],
-    ),
     "seven moving joints": (
         "</robot>",
         f"{ARM}</robot>",

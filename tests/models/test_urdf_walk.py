@@ -141,6 +141,19 @@ def test_a_side_file_stands_above_the_urdf(tmp_path: Path) -> None:
     assert "6 damping" in robot.source["URDF, ignored"]
 
 
+def test_viscous_damping_of_joints_adds_to_kd(tmp_path: Path) -> None:
+    """Six of 18 joints have 0.3 N m s/rad, and 0.02 s x 5.5 N m/0.15 rad is assumed without it."""
+    text = spider_urdf().replace('damping="0"', 'damping="0.3"')
+    (tmp_path / "spider.urdf").write_text(text, encoding="utf-8")
+    robot = load_robot(tmp_path / "spider.urdf")
+    assert robot.servo.kd == pytest.approx(0.8333333333333334, rel=1e-14)
+    assert robot.source["URDF, damping"] == "of the joints, added to servo.kd: 0.1 N m s/rad"
+    (tmp_path / "mine.toml").write_text(
+        '[urdf]\nfile = "spider.urdf"\n[servo]\nkd = "0.5 N m s/rad"\n', encoding="utf-8"
+    )
+    assert load_robot(tmp_path / "mine.toml").servo.kd == pytest.approx(0.6, rel=1e-14)
+
+
 def test_what_a_urdf_has_wrong_or_lacks_a_side_file_may_give(tmp_path: Path) -> None:
     """As in published URDFs, a quarter turn is 1.5704, an inertia has other units, and feet are
     meshes only.

@@ -123,12 +123,12 @@ class LowGround:
     nowhere.
 
     Attributes:
-        held: whether the gait clock waited, for each period.
+        waiting: whether the gait clock waited, for each period.
     """
 
     def __init__(self) -> None:
         self.ground = Ground()
-        self.held: list[bool] = []
+        self.waiting: list[bool] = []
 
     def __call__(self, controller: Controller, step: int, measurement: Measurement) -> None:
         self.ground(controller, step, measurement)
@@ -139,7 +139,7 @@ class LowGround:
         swings = controller.plan.paths.clock.swinging[2]
         measurement.foot_force[2] *= not (swings and lowered[2] > -0.012)
         measurement.foot_force[3] *= step % 700 < 500
-        self.held.append(controller.plan.paths.clock.held)
+        self.waiting.append(controller.plan.paths.clock.waiting)
 
 
 @pytest.mark.parametrize("gait", ["ripple", "amble"])
@@ -149,7 +149,7 @@ def test_feet_that_find_no_ground_are_awaited_at_the_same_step(
     sense = LowGround()
     worst, _ = differences(controller_core, setup_of(gait=gait), sense=sense)
     assert close(worst)
-    assert 0.02 < np.mean(sense.held) < 0.8
+    assert 0.02 < np.mean(sense.waiting) < 0.8
 
 
 @pytest.mark.parametrize(("speed_max", "least", "most"), [(3.0, 0.09, 0.12), (2.6, 0.0, 0.02)])
@@ -167,7 +167,7 @@ def test_feet_of_joints_that_are_too_slow_are_hardly_awaited(
         controller_core, robot, sense=sense, told=lambda t: program(0.7 * t), steps=2000
     )
     assert close(worst)
-    assert least <= np.mean(sense.held) < most
+    assert least <= np.mean(sense.waiting) < most
 
 
 def test_joints_that_are_outrun_fall_back_at_the_same_step(controller_core: ct.CDLL) -> None:

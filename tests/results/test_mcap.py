@@ -5,6 +5,7 @@ messages, and robots' files without our columns are read by their topics.
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,11 @@ from mcap_ros2.writer import Writer
 
 from hexapod_cosim.cosim.logs import messages as ros
 from hexapod_cosim.cosim.logs.mcap_reader import read_mcap, read_topics
-from hexapod_cosim.cosim.logs.mcap_writer import write_mcap
+from hexapod_cosim.cosim.logs.mcap_writer import OURS, write_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import read_parquet
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models import HexapodError, load_robot
+from hexapod_cosim.models.records import JointNames
 
 AWKWARD = [0.0, -0.0, 1.0 / 3.0, -1e-300, 5e-324, 1.7976931348623157e308, np.nan, np.inf, -np.inf]
 BOTH = ["--format", "mcap", "--format", "parquet"]
@@ -117,18 +119,26 @@ def test_reading_by_topics_yields_the_numbers_of_the_columns(folder: Path) -> No
     assert topics.time == pytest.approx(recording.time, abs=1e-12)
 
 
-def test_transforms_are_those_of_the_torsos_origin(tmp_path: Path) -> None:
+def test_transforms_and_joints_are_those_of_the_robots_owner(tmp_path: Path) -> None:
     half = np.sqrt(0.5)  # a quarter turn about z: the torso's x axis is the world's y axis
     names = ("time", *(f"torso.position[{k}]" for k in (1, 2, 3)))
     names += tuple(f"torso.quaternion[{k}]" for k in (1, 2, 3, 4))
     names += tuple(f"{leg}.{joint}.angle" for leg in ("LF", "LM", "LR", "RF", "RM", "RR")
                    for joint in ("coxa", "femur", "tibia"))  # fmt: skip
-    data = np.array([[0.0, 1.0, 2.0, 3.0, half, 0.0, 0.0, half, *[0.0] * 18]])
+    data = np.array([[0.0, 1.0, 2.0, 3.0, half, 0.0, 0.0, half, *(0.1 * k for k in range(18))]])
     path, com = tmp_path / "x.mcap", (0.1, 0.0, 0.0)
-    write_mcap(Recording(names, data), path, torso_com=com)
+    owners = tuple(f"motor {k}" for k in range(18))
+    joints = JointNames(names=owners, reversed=("motor 1", "motor 17"))
+    write_mcap(Recording(names, data), path, torso_com=com, joints=joints)
+    state = decoded(path)["/joint_states"][0]
+    assert tuple(state.name) == owners
+    assert state.position[:3] == [0.0, -0.1, 0.2]
     place = decoded(path)["/tf"][0].transforms[0].transform.translation
     assert (place.x, place.y, place.z) == pytest.approx((1.0, 1.9, 3.0), abs=1e-15)
-    again = read_topics(path, torso_com=com)
+    athena = load_robot("athena")
+    torso = replace(athena.torso, com=com)
+    again = read_topics(path, robot=replace(athena, torso=torso, joints=joints))
+    assert again.data[0, 1:19].tolist() == data[0, 8:].tolist()
     assert again.vector("torso.position")[0] == pytest.approx([1.0, 2.0, 3.0], abs=1e-15)
 
 
@@ -138,7 +148,7 @@ def robot_log(path: Path, commands: str = "/desired_joints") -> None:
     """
     with path.open("wb") as file, Writer(file) as writer:
         schema = writer.register_msgdef(ros.JOINT_STATE, ros.DEFINITIONS[ros.JOINT_STATE])
-        labels = [label.removesuffix("_joint").lower() for label in reversed(ros.JOINT_LABELS)]
+        labels = [label.removesuffix("_joint").lower() for label in reversed(OURS.names)]
 
         def write(topic: str, stamp: int, names: list[str], value: float) -> None:
             header = {

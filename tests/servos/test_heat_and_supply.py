@@ -94,6 +94,25 @@ def test_a_hot_motor_gets_less(core: ct.CDLL, start: float, share: float, left: 
     assert float(duty_share(servo, np.array(start))) == pytest.approx(share, rel=EXACT)
 
 
+def test_the_current_read_after_a_step_is_the_one_that_the_next_step_begins_with(
+    core: ct.CDLL,
+) -> None:
+    """The limit is held over a communication step at that of the temperature at its start."""
+    robot = blocked(start_temperature=345.0, **WARM)
+    servo, plant, command = robot.servo, Plant(core, robot), pushed(100.0)
+    read, held = [plant.output(command)], []
+    for k in range(3):
+        plant.step(0.02 * (k + 1), command)
+        read.append(plant.output(command))
+        squared = read[-1].torque_squared[2, 2] - read[-2].torque_squared[2, 2]
+        held.append(np.sqrt(squared / 0.02) / servo.torque_constant)
+    got = [one.current[2, 2] for one in read]
+    assert held == pytest.approx(got[:3], rel=1e-6)
+    shares = duty_share(servo, np.array([one.winding_temperature[2, 2] for one in read]))
+    assert got == pytest.approx((shares * VOLTS / servo.resistance).tolist(), rel=EXACT)
+    assert 0.01 < got[0] - got[1] < 0.1  # A  a step and the reading at its end differ by this
+
+
 # the supply
 
 

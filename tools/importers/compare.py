@@ -23,7 +23,10 @@ from rich.console import Console
 from rich.table import Table
 
 from hexapod_cosim.cosim.common.plant_files import package_version
+from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.models import load_robot
+from tools.importers.capabilities import Capability, adjoint, tuned, tuned_by_ipopt, updated
 from tools.importers.outcome import (
     Outcome,
     answers,
@@ -108,7 +111,10 @@ def main() -> int:
     show([ours, *rows], walk)
     masters, tools = compare_packages(BUILD / "package", python, duration=duration)
     show_packages([*masters, *tools])
-    return verdict(rows, tools, ours=[ours, *masters])
+    fmu3 = export_fmu(load_robot("athena"), BUILD / "athena3.fmu", fmi=3)
+    used = [tuned(walk.fmu, fmu3), updated(fmu3), adjoint(fmu3), tuned_by_ipopt(BUILD / "casadi")]
+    show_capabilities(used)
+    return verdict(rows, tools, ours=[ours, *masters, *(one for one in used if not one.missing)])
 
 
 def verdict(
@@ -255,6 +261,15 @@ def show_packages(rows: list[PackageRow]) -> None:
             format_difference(one.on_time),
             format_difference(one.late) if not one.trouble else one.trouble,
         )
+    Console(width=max(150, shutil.get_terminal_size().columns)).print(table)
+
+
+def show_capabilities(rows: Sequence[Capability]) -> None:
+    """Prints the table of further capabilities."""
+    table = Table("capability", "tool", "difference", title="what few importers use")
+    for one in rows:
+        missing = "could not be installed" if one.missing else format_difference(one.difference)
+        table.add_row(one.name, one.tool, missing)
     Console(width=max(150, shutil.get_terminal_size().columns)).print(table)
 
 

@@ -111,7 +111,7 @@ static inline int waits(const hxWalkPlanModel *model, const hxCompliant *laws,
   for (int k = 0; k < HX_LEGS; ++k)
     if (clock->absent[k]) return 0;
   hx_gait_clock_landing(&model->paths.clock, clock, plan->at, landing);
-  return hx_compliance_waits(&model->planner.laws.laws, landing, clock->held, &laws->laws);
+  return hx_compliance_waits(&model->planner.laws.laws, landing, clock->waiting, &laws->laws);
 }
 
 /* Begins a new section at the present step, and plans the next step. waiting: the gait clock stands
@@ -142,7 +142,7 @@ static inline void hx_walk_plan_advance(const hxWalkPlanModel *model, int comman
                                         hxCompliant *laws, hxWalkPlan *plan) {
   const int due = command_changed || !plan->has_after;
   if (model->planner.compliant) follow_sensors(model, laws, plan);
-  if (due || plan->paths.clock.held) {
+  if (due || plan->paths.clock.waiting) {
     const int waiting = waits(model, laws, plan);
     if (due || !waiting) plan_afresh(model, waiting, laws, plan);
   }

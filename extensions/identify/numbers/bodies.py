@@ -11,8 +11,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hexapod_cosim.extensions.identify.numbers import Unknown
 from hexapod_cosim.models import JOINT_NAMES, Robot
+from hexapod_cosim.models.records import Link
 
 PAST = 0.25  # of the length of a link
 
@@ -38,42 +42,57 @@ def mass_row(joint: int | None) -> Unknown:
     )
 
 
-def com_row(joint: int | None, axis: int, prior: float) -> Unknown:
-    """Returns the row of a coordinate of a centre of mass; all legs move alike."""
+def com_row(axis: int, prior: float) -> Unknown:
+    """Returns the row of a coordinate of the torso's centre of mass."""
 
     def read(robot: Robot) -> float:
-        return float(_body(robot, joint).com[axis])
+        return float(robot.torso.com[axis])
+
+    def write(robot: Robot, value: float) -> Robot:
+        com = list(robot.torso.com)
+        com[axis] = value
+        return replace(robot, torso=replace(robot.torso, com=(com[0], com[1], com[2])))
+
+    return Unknown(
+        key=f"torso.com[{axis + 1}]", unit="m", group="mass", prior=prior, positive=False,
+        read=read, write=write,
+    )  # fmt: skip
+
+
+def along_row(joint: int, prior: float) -> Unknown:
+    """Returns the row of how far a centre of mass lies along its link; all legs move alike.
+
+    The direction is that from the joint to the next one (the foot), wherever the angle 0 is. The
+    centre lies between the two joints or PAST of the length beyond either, because housings of
+    servos stick out. What the robot file says is always possible.
+    """
+
+    def read(robot: Robot) -> float:
+        link = robot.legs[0].links[joint]
+        return float(np.dot(link.com, _direction(link)))
 
     def write(robot: Robot, value: float) -> Robot:
         shift = value - read(robot)
 
-        def moved(body: Any) -> Any:
-            com = list(body.com)
-            com[axis] += shift
-            return replace(body, com=tuple(com))
+        def moved(link: Any) -> Any:
+            return replace(link, com=tuple((link.com + shift * _direction(link)).tolist()))
 
         return _with_bodies(robot, joint, moved)
 
+    def limits(robot: Robot) -> tuple[float, float]:
+        longest = max(math.hypot(*leg.links[joint].tip) for leg in robot.legs)  # m
+        own = read(robot)
+        return min(-PAST * longest, own), max((1.0 + PAST) * longest, own)
+
     return Unknown(
-        key=f"{_name(joint)}.com[{axis + 1}]", unit="m", group="mass", prior=prior, positive=False,
-        read=read, write=write,
-        limits_of=None if joint is None or axis else lambda robot: _along(robot, joint),
+        key=f"{_name(joint)}.com_along", unit="m", group="mass", prior=prior, positive=False,
+        read=read, write=write, limits_of=limits,
     )  # fmt: skip
 
 
-def _along(robot: Robot, joint: int) -> tuple[float, float]:
-    """Returns between which places along a link its centre of mass can be [m].
-
-    That is between its joint and the next one (the foot), and PAST of the length beyond either,
-    because housings of servos stick out. What the robot file says is always possible.
-    """
-    links = [leg.links[joint] for leg in robot.legs]
-    low, high = (
-        [side * PAST * abs(one.length) + place * one.length for one in links]
-        for side, place in ((-1.0, 0.0), (1.0, 1.0))
-    )
-    own = float(links[0].com[0])
-    return min(*low, *high, own), max(*low, *high, own)
+def _direction(link: Link) -> NDArray[np.float64]:
+    """Returns the direction (3,) from a link's joint to the next one."""
+    return np.array(link.tip) / math.hypot(*link.tip)
 
 
 def gyration_row() -> Unknown:

@@ -87,7 +87,6 @@ static hxStepper stepper = {
     .sensed_count = SENSED,
     .given = given,
     .value = value,
-    .h = 0.005, /* s    that of the scenarios */
 };
 
 /* Allocates the robot. The page calls this and all functions below. */
@@ -95,6 +94,7 @@ HX_API int hx_page_create(void) {
   plant = hx_plant_create();
   controller = hx_controller_create();
   hx_controller_definition_default(&walk);
+  stepper.h = walk.period;
   for (size_t i = 0; i < ANGLES; ++i) {
     sensed[i] = ANGLE + i;
     sensed[ANGLES + i] = FORCE + i;

@@ -107,16 +107,23 @@ static inline hxReal quadratic_friction(const hxModel *model, hxReal motor, hxRe
   return hx_select(hx_less(motor * external, zero), squares, zero);
 }
 
+/* Returns |a m - b e| of shares a, b >= 0. Where both are 0, its derivatives are those by shares
+ * that rise. */
+static inline hxReal load_friction(hxNumber a, hxReal m, hxNumber b, hxReal e) {
+  if (HX_HAS_SLOPES && hx_re(a) == 0.0 && hx_re(b) == 0.0) return a * hx_abs(m) + b * hx_abs(e);
+  return hx_abs(a * m - b * e);
+}
+
 /* Sets the friction of a motor and its gear and its derivative, under the external torque on the
  * joint (eq. 49, 50); the motor's torque is set. */
 HX_RARE void hx_measured_friction(const hxModel *model, const hxReal *speed, const hxReal *external,
                                   hxServo *servo) {
   const hxReal motor = servo->torque, t = hx_tanh(*speed * model->per_gear_speed);
   hxReal budget = model->coulomb_friction +
-                  hx_abs(model->motor_load * motor - model->external_load * *external);
+                  load_friction(model->motor_load, motor, model->external_load, *external);
   if (model->stribeck) {
     const hxReal load =
-        hx_abs(model->stribeck_motor * motor - model->stribeck_external * *external);
+        load_friction(model->stribeck_motor, motor, model->stribeck_external, *external);
     budget += stribeck_share(model, *speed) *
               (model->gear_stribeck + load + quadratic_friction(model, motor, *external));
   }

@@ -81,9 +81,11 @@ static inline hxNumber hx_asin(hxNumber x) {
   return hx_chain(x, asin(s), cosine > 0.0 ? 1.0 / cosine : 0.0);
 }
 
+/* d x^y = y x^(y-1) dx + x^y ln x dy; 0 where x is 0. */
 static inline hxReal hx_lanes_pow(hxReal x, hxReal y) {
   const double power = hx_pow(hx_re(x), hx_re(y));
-  return hx_chain(x, power, hx_re(x) > 0.0 ? hx_re(y) * power / hx_re(x) : 0.0);
+  if (!(hx_re(x) > 0.0)) return power;
+  return hx_complex(power, power * (hx_re(y) / hx_re(x) * hx_im(x) + hx_ln(hx_re(x)) * hx_im(y)));
 }
 
 static inline hxReal hx_expm1(hxReal x) {

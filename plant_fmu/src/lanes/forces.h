@@ -329,7 +329,7 @@ HX_RARE void leg_pairs(const hxModel *model, const hxContactState *state,
 }
 
 /* Computes orientation and inertia of the torso. */
-static inline void torso_pass(const hxModel *model, const hxPlantMotion *motion, hxWork *work) {
+HX_INLINE void torso_pass(const hxModel *model, const hxPlantMotion *motion, hxWork *work) {
   const hxNumber *J = model->torso_inertia;
   const hxSym3 body = {hx_splat(J[0]), hx_splat(J[1]), hx_splat(J[2]),
                        hx_splat(J[3]), hx_splat(J[4]), hx_splat(J[5])};

@@ -81,7 +81,7 @@ static double first_exit(const hxDepths *low, const hxDepths *high, double level
  * through depths and speeds at two times. */
 static double expected_touch(const hxStart *start, double t_low, const hxDepths *low, double t_high,
                              const hxDepths *high) {
-  const double h = t_high - t_low, level = 0.5 * start->touch;
+  const double h = t_high - t_low, level = 0.5 * start->touch_depth;
   const hxModel *model = start->model;
   double first = 1.0;
   for (int k = 0; k < model->listed; ++k)
@@ -98,7 +98,7 @@ static double find_touchdown(const hxStart *start, double h, hxState *state, hxT
   hxDepths found, depths_low;
   hx_depths_of(start->model, start->contact, start->y, &depths_low);
   for (int guess = 1;
-       deepest_open(start->model, start, depths) > start->touch && high - low > step_floor;
+       deepest_open(start->model, start, depths) > start->touch_depth && high - low > step_floor;
        ++guess) {
     double middle = guess % 3 ? expected_touch(start, low, &depths_low, high, depths) : low;
     if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
@@ -301,7 +301,7 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
                    .scratch = scratch};
   const int rows = model->listed, foot_rows = model->foot_rows;
   const hxModel *feet = rows > foot_rows ? events->feet : model;
-  start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
+  start.touch_depth = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
   double first = fmin(state->first_step,
                       state->next_step); /* new inputs cause a larger error than the last step's */
   double *next_step = command->time < state->time ? &state->next_step : &first;

@@ -43,7 +43,7 @@ typedef struct {
   const hxContactState *contact;
   const hxMethodRow *method;
   double t;
-  double touch; /* m  largest depth of a contact that has just touched down */
+  double touch_depth; /* m  largest depth of a contact that has just touched down */
   const hxPlantMotion *y;
   hxFootprintLog *footprints;
   hxScratch *scratch;

@@ -19,12 +19,16 @@ static int is_inertia(const double I[6]) {
          p[2] >= 0.0 && minor >= 0.0 && det >= 0.0;
 }
 
-/* Fails for an impossible inertia. */
-static void check_inertia(hxChecker *c, const char *name, const double inertia[6]) {
-  if (!is_inertia(inertia))
-    hx_check_fail(c, name, inertia[0],
-                  "an inertia that a body can have: positive, each principal moment at most the "
-                  "sum of the others");
+/* Fails for an impossible inertia I of a body; names its largest moment. */
+static void check_inertia(hxChecker *c, const char *body, const double I[6]) {
+  static const char *const moment[] = {"inertia_xx", "inertia_yy", "inertia_zz"};
+  const int yz = I[2] > I[1] ? 2 : 1, largest = I[yz] > I[0] ? yz : 0;
+  char name[32];
+  if (is_inertia(I)) return;
+  hx_print(name, sizeof name, "%s%s", body, moment[largest]);
+  hx_check_fail(c, name, I[largest],
+                "an inertia that a body can have: positive, each principal moment at most the "
+                "sum of the others");
 }
 
 /* Fails for a vector of n numbers without length. */
@@ -42,7 +46,7 @@ static void check_legs(hxChecker *c, const hxDefinition *d) {
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const hxLink *link = &d->leg[leg].link[joint];
       const double tip[3] = {link->length, link->offset_y, link->offset_z};
-      hx_joint_label(leg, joint, "inertia_xx", name);
+      hx_joint_label(leg, joint, "", name);
       check_inertia(c, name, link->inertia);
       hx_joint_label(leg, joint, "axis", name);
       check_not_zero(c, name, link->axis, 3, "a direction: not all zero");
@@ -110,7 +114,7 @@ static void check_rotors(hxChecker *c, const hxDefinition *d) {
 
 /* Checks conditions between several numbers that are within their ranges. */
 static void check_relations(hxChecker *c, const hxDefinition *d) {
-  check_inertia(c, "torso.inertia_xx", d->torso.inertia);
+  check_inertia(c, "torso.", d->torso.inertia);
   check_legs(c, d);
   check_servo(c, d);
   if (c->status == HX_OK) check_rotors(c, d);
@@ -154,15 +158,17 @@ hxStatus hx_definition_check_coordinates(const hxDefinition *d, char *message) {
   return HX_OK;
 }
 
-/* Returns whether no number of an input is outside of the narrowest ranges: of angles, rad, and of
- * all others. Inputs of walks are, and every step asks this first. */
+/* Returns whether no number of an input is outside of the narrowest ranges: of angles, rad, of
+ * shares (weakness and lock, the last numbers) and of all others. Inputs of walks are, and every
+ * step asks this first. */
 static int is_well_inside(const hxInput *input) {
   enum { ANGLES = HX_LEGS * HX_JOINTS, SIZE = sizeof(hxInput) / sizeof(double) };
   const double angle = 6.28, others = 1e4;
   const double *x = &input->angle_ref[0][0];
   int outside = 0;
   for (int i = 0; i < ANGLES; ++i) outside |= !(fabs(x[i]) <= angle);
-  for (int i = ANGLES; i < SIZE; ++i) outside |= !(fabs(x[i]) <= others);
+  for (int i = ANGLES; i < SIZE - 2 * ANGLES; ++i) outside |= !(fabs(x[i]) <= others);
+  for (int i = SIZE - 2 * ANGLES; i < SIZE; ++i) outside |= !(x[i] >= 0.0 && x[i] <= 1.0);
   return !outside;
 }
 

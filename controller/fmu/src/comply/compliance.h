@@ -314,15 +314,15 @@ static inline int hx_compliance_meets(const hxComplianceModel *model, int leg,
          !laws->doubted[leg];
 }
 
-/* Returns whether the gait clock waits for the feet of legs that end their swing (C50). held: it
+/* Returns whether the gait clock waits for the feet of legs that end their swing (C50). waiting: it
  * waits already. */
 static inline int hx_compliance_waits(const hxComplianceModel *model, const int landing[HX_LEGS],
-                                      int held, const hxCompliance *laws) {
+                                      int waiting, const hxCompliance *laws) {
   int waits = 0;
   if (!model->parts.touchdown || laws->trust.level < 1.0 || hx_trust_feet_late(&laws->trust))
     return 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int found = held ? carries(laws, leg) : laws->touching[leg];
+    const int found = waiting ? carries(laws, leg) : laws->touching[leg];
     waits |= landing[leg] && !found && !laws->doubted[leg] &&
              laws->touchdown.offset[leg] > -hx_reach_limit;
   }

@@ -143,7 +143,7 @@ static inline void place_foot(const hxFootPathsModel *model, const hxFootPaths *
   feet->plane[leg] = hx_times(back, hx_plane_sub(ground_of(feet, leg), feet->way));
   /* a foot on the ground: dp/dt = -(v + i w p) */
   /* 1/s, at which the foot passes through its path */
-  const double pace = paths->clock.held ? 0.0 : 1.0 / model->swing_time;
+  const double pace = paths->clock.waiting ? 0.0 : 1.0 / model->swing_time;
   const hxPlane pulled = hx_scaled(hx_times(back, feet->pull[leg]), slope * pace);
   feet->velocity[leg] = hx_plane(pulled.x - (v.x - w * was.y), pulled.y - (v.y + w * was.x));
   hop(tau, model->step_height, model->touchdown_speed * model->swing_time, &lift, &climb);

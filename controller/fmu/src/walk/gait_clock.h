@@ -29,7 +29,7 @@ typedef struct hxGaitClock {
   /* the foot will need no step at its next lift-off: it is at its stance position under a body at
    * rest */
   int stays[HX_LEGS];
-  int held; /* the clock stands still until feet at the ends of their swings carry load */
+  int waiting; /* the clock stands still until feet at the ends of their swings carry load */
   int awaited[HX_LEGS]; /* the clock waits for this foot */
   int ending;           /* another gait follows: legs finish their steps and begin no other */
   int absent[HX_LEGS];  /* out of service: neither stands nor swings */
@@ -91,7 +91,7 @@ static inline int hx_gait_clock_serves(const hxGaitClockModel *model, const hxGa
 
 /* Returns the periods on the clock `number` periods after the section began (C50). */
 static inline int64_t hx_gait_clock_reached(const hxGaitClock *clock, int64_t number) {
-  return clock->held ? clock->before : clock->before + number;
+  return clock->waiting ? clock->before : clock->before + number;
 }
 
 /* Returns the part tau of its swing that a leg at this phase has completed. */
@@ -122,7 +122,7 @@ HX_SELDOM static void hx_gait_clock_start_standing(const hxGaitClockModel *model
 static inline void hx_gait_clock_begin_section(const hxGaitClockModel *model, int64_t number,
                                                hxGaitClock *clock) {
   clock->before = clock->walking ? hx_gait_clock_reached(clock, number) : 0;
-  clock->held = 0;
+  clock->waiting = 0;
   memset(clock->awaited, 0, sizeof clock->awaited);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const int stood = hx_gait_clock_stands(model, leg, clock->before);
@@ -158,7 +158,7 @@ HX_SELDOM static void hx_gait_clock_keep_down(const hxGaitClockModel *model,
 /* Ends the swings at once; the walk ends with them (C58). */
 static inline void hx_gait_clock_drop(hxGaitClock *clock) {
   clock->ending = 1;
-  clock->held = 0;
+  clock->waiting = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     clock->dropped[leg] = clock->swinging[leg] &= !clock->absent[leg];
   memset(clock->awaited, 0, sizeof clock->awaited);
@@ -202,7 +202,7 @@ static inline void hx_gait_clock_hold(const hxGaitClockModel *model, int64_t num
                                       hxGaitClock *clock) {
   hx_gait_clock_landing(model, clock, number, clock->awaited);
   clock->before = hx_gait_clock_reached(clock, number);
-  clock->held = 1;
+  clock->waiting = 1;
   memset(clock->lifted, 0, sizeof clock->lifted);
 }
 
@@ -210,7 +210,7 @@ static inline void hx_gait_clock_hold(const hxGaitClockModel *model, int64_t num
  * off or touches down before it. */
 static inline int hx_gait_clock_reach(const hxGaitClockModel *model, const hxGaitClock *clock,
                                       int64_t number) {
-  if (!clock->walking || clock->held || number == 1) return 1;
+  if (!clock->walking || clock->waiting || number == 1) return 1;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     if (hx_gait_clock_serves(model, clock, leg, clock->before + number) != clock->standing[leg])
       return 0;
@@ -219,7 +219,7 @@ static inline int hx_gait_clock_reach(const hxGaitClockModel *model, const hxGai
 
 /* Returns whether all legs stand and begin no other step, because another gait follows. */
 static inline int hx_gait_clock_ended(const hxGaitClock *clock) {
-  int ended = clock->ending && !clock->held;
+  int ended = clock->ending && !clock->waiting;
   for (int leg = 0; leg < HX_LEGS; ++leg) ended &= clock->stays[leg];
   return ended;
 }

@@ -1,6 +1,6 @@
 """Makes docs/images/live.webp, the README's animated picture of a robot that is driven live.
 
-python docs/figure_live.py
+python docs/live/figure.py
 
 The loop's clock goes on from picture to picture, however long the browser takes to draw one. So the
 figures of real time would say nothing, and are left out.
@@ -143,7 +143,7 @@ def main() -> None:
     clock.value += 1.0  # lets the loop end
     server.stop()
     thread.join()
-    target = Path(__file__).parent / "images" / "live.webp"
+    target = Path(__file__).parents[1] / "images" / "live.webp"
     pictures[0].save(
         target, save_all=True, append_images=pictures[1:], duration=round(1000 / RATE), loop=0,
         quality=QUALITY, method=6,

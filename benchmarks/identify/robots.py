@@ -1,7 +1,7 @@
 """Identifies robots with secret numbers from their logs: are the intervals right, and how much
 nearer does the identified robot come?
 
-usage: PYTHONPATH=tests/identify python -m benchmarks.identification [--robots 20] [--seconds 6]
+usage: PYTHONPATH=tests/identify python -m benchmarks.identify.robots [--robots 20] [--seconds 6]
        [--workers 1] [--table FILE.csv]
 
 Each robot is drawn as the table of unknowns says of what is known beforehand, walks on the plant
@@ -118,7 +118,7 @@ def table_row(seed: int, one: Score, seconds: float) -> dict[str, Any]:
     found: dict[str, Any] = {
         "robot": seed,
         "log_s": seconds,
-        "told": one.determined,
+        "determined": one.determined,
         "covered": one.covered,
         "outside": " ".join(one.missed),
         "left_out": " ".join(one.left_out),
@@ -150,10 +150,10 @@ def write_table(path: Path, rows: Sequence[dict[str, Any]]) -> None:
 
 def summary(rows: Sequence[dict[str, Any]]) -> dict[str, float]:
     """Returns the share of covered numbers and the median ratios of the judged channels."""
-    told = sum(int(row["told"]) for row in rows)
+    determined = sum(int(row["determined"]) for row in rows)
     covered = sum(int(row["covered"]) for row in rows)
     found: dict[str, float] = {
-        "robots": len(rows), "told": told, "covered": covered / max(told, 1)
+        "robots": len(rows), "determined": determined, "covered": covered / max(determined, 1)
     }  # fmt: skip
     for key in JUDGED:
         ratios = [float(row[f"{key}_before"]) / float(row[f"{key}_after"]) for row in rows]

@@ -1,6 +1,6 @@
 """Writes the tables of README.md and docs/ that compare controls: `make figures`.
 
-usage: python -m benchmarks.pages [FOLDER]
+usage: python -m benchmarks.course.pages [FOLDER]
 
 The folder is that of `hexapod benchmark`, out/benchmark; the other tables' walks are run here.
 """
@@ -58,7 +58,7 @@ def compared(scenario: str, controls: Sequence[str], *settings: str) -> Comparis
     """Returns the comparison of controls over SEEDS, in a scenario without its gait."""
     plan = replace(load_scenario(scenario, overrides=settings), variation=STANDARD)
     named = {key: value for key, value in plan.settings.items() if key != "gait"}
-    found = parse_controls(controls, where="benchmarks.pages")
+    found = parse_controls(controls, where="benchmarks.course.pages")
     plans = [
         replace(plan, settings=named, control=control.text, seed=seed)
         for control in found

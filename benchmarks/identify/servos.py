@@ -1,6 +1,6 @@
 """Compares the servo presets with logs of real servos on a pendulum bench, and with BAM's scheme.
 
-usage: python -m benchmarks.servos [--kscale FOLDER] [--pictures FOLDER] [-o FILE.csv]
+usage: python -m benchmarks.identify.servos [--kscale FOLDER] [--pictures FOLDER] [-o FILE.csv]
 
 The logs are not part of the repository: those of an XL330 are read from ../shared/data/servo_logs,
 those of K-Scale (github.com/kscalelabs/sysid, commit ca1ecb1) from a folder that is given. What is
@@ -28,7 +28,7 @@ from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.servos.motor import friction_budget, motor_torque
 from hexapod_cosim.models.servos.presets import measured_servo
 
-XL330 = Path(__file__).parents[2] / "shared" / "data" / "servo_logs"
+XL330 = Path(__file__).parents[3] / "shared" / "data" / "servo_logs"
 PRESETS = {
     "xl330": ("xl330_m1", "xl330_m3", "xl330_m4", "xl330_m6", "xl330_fitted"),
     "sts3215": ("sts3215_m1", "sts3215_12v"),
