@@ -3,7 +3,7 @@
 usage: python -m benchmarks.waiting [NAME ...]
 
 A row is a command in a new process. Cold is its first run with an empty cache of the user, warm the
-faster of two further runs. The processor time of the warm run depends less on other programs.
+faster of two further runs. Processor times depend less on other programs.
 """
 
 from __future__ import annotations
@@ -58,13 +58,15 @@ def main(names: list[str]) -> None:
     unknown = set(names) - set(COMMANDS)
     if unknown:
         sys.exit(f"unknown: got {', '.join(unknown)}, expected {', '.join(COMMANDS)}")
-    print("| command | cold, s | warm, s | processor, s |\n|---|---|---|---|")
+    columns = ("command", "cold, s", "warm, s", "cold, processor s", "warm, processor s")
+    print(f"| {' | '.join(columns)} |\n{'|---' * len(columns)}|")
     with tempfile.TemporaryDirectory() as folder:
         environment = {**os.environ, "XDG_CACHE_HOME": f"{folder}/cache"}
         for name in names or COMMANDS:
             cold, *others = (measured(name, folder, environment) for _ in range(3))
             warm = min(others, key=lambda wait: wait.wall)
-            print(f"| {name} | {cold.wall:.2f} | {warm.wall:.2f} | {warm.processor:.2f} |")
+            times = (cold.wall, warm.wall, cold.processor, warm.processor)
+            print(f"| {name} | {' | '.join(f'{value:.2f}' for value in times)} |", flush=True)
 
 
 def measured(name: str, folder: str, environment: Mapping[str, str]) -> Wait:

@@ -15,11 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.controller.checks import (
-    ControllerError,
-    check_law,
-    check_period,
-)
+from hexapod_cosim.controller.checks import ControllerError, check_law, check_period
 from hexapod_cosim.controller.comply.compliant import Compliant, sense
 from hexapod_cosim.controller.comply.paper import Paper, Step
 from hexapod_cosim.controller.comply.posture import LEVEL
@@ -130,9 +126,12 @@ class Controller(Stateful):
 
     def _watch(self, measurement: Measurement) -> None:
         """Takes legs that are lost out of service, before the present step is planned (C57)."""
-        health = self.health
-        health.step(measurement.angle, sense(measurement, LEVEL), self._out)
-        if self.plan.lose(health.lost, self._out):
+        health, plan = self.health, self.plan
+        force = sense(measurement, LEVEL)
+        # a foot that its leg lifts bears no load: a stuck sensor must not make the servos strange
+        force[plan.paths.clock.swinging & (plan.now.feet.rise > 0.0)] = 0.0
+        health.step(measurement.angle, force, self._out)
+        if plan.lose(health.lost, self._out):
             self._change()
 
     def _fold(self, measurement: Measurement) -> None:
@@ -260,7 +259,7 @@ class Controller(Stateful):
                 expected=f"t = {due} s",
                 fix="step once per period, or reset the controller",
             )
-        command_changed = self.plan.ramp.aim(command)
+        command_changed = self.plan.aim(command)
         # extreme commands overflow; the legs do not reach such targets, and this is reported
         with np.errstate(over="ignore", invalid="ignore"):
             if first:  # the first step is the stance itself, for every command
@@ -275,6 +274,7 @@ class Controller(Stateful):
             self.fade.step(self.legs, self._out)
             self._fold(measurement)
             self.diagnostics.absent[...] = self.plan.absence.legs
+            self.diagnostics.outrun[...] = self.plan.pace.outrun
             self.diagnostics.faulty[...] = self.health.faulty.T
             self._adopt()
         return self._out

@@ -79,8 +79,8 @@ class Parts:
     fallback: Annotated[
         Switch,
         Row(
-            "no feedback from a sensor that contradicts the plan; kinematic control while the "
-            "robot slides or outruns its joints"
+            "a sensor that contradicts the plan is replaced; kinematic control while the robot "
+            "slides"
         ),
     ] = True
     squeeze: Annotated[

@@ -22,12 +22,13 @@ from hexapod_cosim.controller.plane import LEGS, Array, Mask, cis, rows_of
 from hexapod_cosim.controller.planned_step import PlannedStep, StepPlanner
 from hexapod_cosim.controller.signals import JointCommand
 from hexapod_cosim.controller.walk.absence import Absence
-from hexapod_cosim.controller.walk.command import CommandRamp
+from hexapod_cosim.controller.walk.command import BodyCommand, CommandRamp
 from hexapod_cosim.controller.walk.foot_paths import FootPaths
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.gait_clock import NO_LEG
 from hexapod_cosim.controller.walk.inverse_dynamics import Neighbours
 from hexapod_cosim.controller.walk.kinematics import Feet, LegSolver, Pose
+from hexapod_cosim.controller.walk.pace import Pace
 from hexapod_cosim.controller.walk.swing import Twist
 
 
@@ -35,7 +36,8 @@ class WalkPlan(Stateful):
     """The planned steps of one robot in one gait.
 
     Attributes:
-        ramp: of the command.
+        pace: finds the share of the command that the joints can follow.
+        ramp: of this share.
         paths: of the feet.
         at: the present step, counted from the begin of its section.
         last: the step at which the ramp ends, where a new section begins.
@@ -45,7 +47,7 @@ class WalkPlan(Stateful):
         laws: compliant control, on which the plan depends; None: none.
     """
 
-    STATE = ("ramp", "paths", "at", "last", "cut", "before", "now", "after", "absence")
+    STATE = ("pace", "ramp", "paths", "at", "last", "cut", "before", "now", "after", "absence")
 
     def __init__(
         self, gait: Gait, parts: Parts, *, legs: LegSolver, period: float, laws: Compliant | None
@@ -58,6 +60,7 @@ class WalkPlan(Stateful):
         narrow = legs.pose(home[:, 0] + 1j * home[:, 1] + inward, home[:, 2])
         turned = legs.rolling(narrow.angle)
         self.paths = FootPaths(gait, home, period=period, inward=inward, turned=turned)
+        self.pace = Pace(gait, legs, self.paths.home_height)
         if laws is not None:
             self.paths.clock.handover = laws.support.handover
         handover = 0.0 if laws is None else laws.support.handover * gait.period
@@ -68,6 +71,7 @@ class WalkPlan(Stateful):
 
     def reset(self) -> None:
         """Plans to stand in the stance."""
+        self.pace.reset()
         self.ramp.reset()
         self.at, self.last, self.cut = 0, math.inf, True
         self.before: PlannedStep | None = None
@@ -77,6 +81,21 @@ class WalkPlan(Stateful):
         feet = self.paths.reset()
         value, posture, _ = self._look_ahead(0, 0)
         self.now = self.planner.lay_out(value, posture, feet, self.paths.clock, self.absence, 0)
+
+    # ------------------------------------------------------------------------------ the command
+
+    def aim(self, command: BodyCommand) -> bool:
+        """Leads the body to a command, as far as the joints can follow it (C59).
+
+        Returns whether the plan no longer applies. Raises HexapodError for a number that is not
+        finite.
+        """
+        return command != self.pace.asked and self._set_pace(command)
+
+    def _set_pace(self, command: BodyCommand) -> bool:
+        """Aims at the share of a command that the joints can follow in the present gait."""
+        absence, home = self.absence, self.paths.aims()
+        return self.ramp.aim(self.pace.follow(command, home, absence.goal, absence.legs))
 
     # ---------------------------------------------------------------------------------- a step
 
@@ -204,6 +223,7 @@ class WalkPlan(Stateful):
             clock.absent = self.absence.legs
         self.now = self.now._replace(feet=self.paths.join(self.now.feet, self.absence.torso, back))
         self.after, self.at, self.last, self.cut = None, 0, math.inf, True
+        self._set_pace(self.pace.asked)
 
     def carry(self, before: WalkPlan) -> None:
         """Goes on in the phase of the plan under another control, in the same gait."""
@@ -282,7 +302,6 @@ class WalkPlan(Stateful):
             rise=now.feet.rise,
             swinging=clock.swinging,
             awaited=clock.awaited,
-            overspeed=bool((np.abs(speed) >= self.legs.speed_max).any()),
         )
         return PresentStep(
             load=load,

@@ -58,7 +58,8 @@ class Diagnostics:
     shift: Plane = field(default_factory=lambda: np.zeros(LEGS, dtype=np.complex128))
     lift: Array = field(default_factory=lambda: np.zeros(LEGS))  # m    vertical correction
     unreachable: Mask = field(default_factory=_flags)  # the joints could not follow
-    fallback: Mask = field(default_factory=_flags)  # walks without feedback
+    fallback: Mask = field(default_factory=_flags)  # under kinematic control
     absent: Mask = field(default_factory=_flags)  # out of service: the others walk without it
+    outrun: Mask = field(default_factory=_flags)  # too slow for the command: the body walks slower
     # (3, 6) joints and legs: servos that do not follow their commands
     faulty: Mask = field(default_factory=lambda: np.zeros((3, LEGS), dtype=np.bool_))

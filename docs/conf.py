@@ -27,7 +27,6 @@ version = release = version_of("hexapod-cosim")
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
-    "sphinx.ext.autosummary",
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx.ext.mathjax",
@@ -41,7 +40,6 @@ myst_heading_anchors = 3
 myst_dmath_double_inline = True
 nb_execution_mode = "off"  # tools/docs runs the notebooks
 
-autosummary_generate = True
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 python_use_unqualified_type_names = True
@@ -57,7 +55,6 @@ nitpick_ignore_regex = [
 ]
 suppress_warnings = ["misc.highlighting_failure"]  # lines of other languages in a block
 
-templates_path = [str(ROOT / "docs" / "_templates")]  # autosummary looks beside the pages
 html_theme = "furo"
 html_title = "hexapod-cosim"
 html_static_path = ["_static", str(MATHJAX)]

@@ -3,6 +3,7 @@
 The standing robot shall rise by RISE while it is pushed sideways. A chain of derivatives runs
 beside the FMU's steps: exp(M h) of the matrix M of the directional derivatives of its rates takes
 the change of the state by both numbers from step to step. Feet must not lift or touch down.
+A simulation of a scenario checks the cost.
 
 usage: pip install casadi; python examples/07_casadi.py
 """
@@ -16,6 +17,8 @@ from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+import hexapod_cosim
+from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.models import load_robot
@@ -41,8 +44,9 @@ class Rise:
         names = [f"{leg.name}.{link}" for leg in robot.legs for link in ("coxa", "femur", "tibia")]
         self.given = [self.reference[f"{name}.angle_ref"] for name in names]
         self.gain = [self.reference["servo.kp"]]
-        self.shown = [self.reference[n] for n in ("torso.position[3]", "torso.velocity[2]")]
-        self.shown += [self.reference[f"{name}.torque"] for name in names]
+        self.outputs = ["torso.position[3]", "torso.velocity[2]"]
+        self.outputs += [f"{name}.torque" for name in names]
+        self.shown = [self.reference[name] for name in self.outputs]
         self.knowns = self.states + self.gain + self.given
         self.weight = np.array([1.0, 1e-3, *[SOFT] * len(names)])
         self.legs, self.stance = LegSolver(robot), robot.stance
@@ -102,6 +106,32 @@ class Rise:
                 found = self.fmu.getDirectionalDerivative(self.shown, self.knowns, seeds)
                 slope[j] += 2.0 * (self.weight * shown) @ np.array(found)
         return cost, slope
+
+
+class Riser:
+    """A controller that stands for SETTLED steps and then rises."""
+
+    def __init__(self, rise: Rise, height: float) -> None:
+        self.rise, self.height = rise, height  # m
+
+    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
+        """Returns the joint commands for the next macro-step."""
+        del command, measurement
+        angle, _ = self.rise.path(self.height, max(0.0, t - (SETTLED - 1) * STEP))
+        return JointCommand(angle_ref=angle.reshape(6, 3), speed_ref=np.zeros((6, 3)))
+
+
+def simulated_cost(rise: Rise, number: Array) -> float:
+    """Returns the cost [m2] of gain [N m/rad] and height [m] by a simulation of a scenario."""
+    begin, length = SETTLED * STEP, STEPS * STEP
+    events = [
+        {"time": begin, "duration": length, "force": [0.0, PUSH, 0.0]},
+        {"time": begin, "parameter": "servo.kp", "value": float(number[0])},
+    ]
+    settings = {"duration": begin + length, "macro_step": STEP, "events": events}
+    result = hexapod_cosim.simulate("stand", Riser(rise, number[1]), settings=settings)
+    shown = result.recording.columns(rise.outputs)[-STEPS:] - rise.goal
+    return float(np.sum(shown**2 @ rise.weight))
 
 
 def tune(rise: Rise) -> Array:
@@ -167,6 +197,7 @@ def main() -> None:
         differences = [(high - low) / 2e-3 for high, low in ends]
         print("gradient   ", *(f"{v:.4e}" for v in slope * SCALE))
         print("differences", *(f"{v:.4e}" for v in differences))
+        print(f"cost {before:.4g}, simulated {simulated_cost(rise, START):.4g}")
         try:
             best = tune(rise)
         except ImportError:
@@ -174,7 +205,7 @@ def main() -> None:
         else:
             after = rise.cost(best)[0]
             print(f"servo.kp {best[0]:.1f} N m/rad, height {1e3 * best[1]:.2f} mm")
-            print(f"cost {before:.4g} -> {after:.4g}")
+            print(f"cost {before:.4g} -> {after:.4g}, simulated {simulated_cost(rise, best):.4g}")
         rise.fmu.freeFMUState(rise.settled)
         rise.fmu.terminate()
         rise.fmu.freeInstance()

@@ -237,10 +237,7 @@ def applied_forces(
 
 
 def joint_torques(
-    robot: Robot,
-    body: Array,
-    command: Command,
-    external: Array | None = None,
+    robot: Robot, body: Array, command: Command, external: Array | None = None
 ) -> tuple[Array, Array]:
     """Returns motor torque (6, 3) and friction (6, 3) on the child [N m].
 

@@ -49,11 +49,7 @@ from hexapod_cosim.models.friction import friction_grip, turning_slopes
 from hexapod_cosim.models.kinematics import BODIES, JOINTS, LEGS, joint_angles, joint_speeds
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.servos.motor import friction_drag, has_measured_friction
-from hexapod_cosim.models.soil.law import (
-    shear_limit,
-    soil_normal_force,
-    soil_normal_slopes,
-)
+from hexapod_cosim.models.soil.law import shear_limit, soil_normal_force, soil_normal_slopes
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,8 @@
-"""Compares the servo presets with logs of real servos on a pendulum bench, and with BAM's scheme.
+"""Compares servo presets and fits with logs of real servos on a pendulum bench that they did not
+see, and with BAM's scheme; prints each row of the table in docs/reality.md.
 
-usage: python -m benchmarks.identify.servos [--kscale FOLDER] [--pictures FOLDER] [-o FILE.csv]
+usage: python -m benchmarks.identify.servos [--kscale FOLDER] [--pictures FOLDER] [--workers N]
+       [-o FILE.csv]
 
 The logs are not part of the repository: those of an XL330 are read from ../shared/data/servo_logs,
 those of K-Scale (github.com/kscalelabs/sysid, commit ca1ecb1) from a folder that is given. What is
@@ -11,18 +13,24 @@ from __future__ import annotations
 
 import argparse
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import replace
+from itertools import repeat, zip_longest
+from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hexapod_cosim.extensions.identify.bench import read_bench_log
-from hexapod_cosim.extensions.identify.bench.command import BenchReplay, drawn
+from hexapod_cosim.extensions.identify.bench.choice import Split, fitted_and_judged, splits
+from hexapod_cosim.extensions.identify.bench.command import BenchReplay, drawn, with_start
 from hexapod_cosim.extensions.identify.bench.errors import Errors, log_errors
 from hexapod_cosim.extensions.identify.bench.fit import fit_servo
 from hexapod_cosim.extensions.identify.bench.log import BenchLog
 from hexapod_cosim.extensions.identify.bench.pendulum import Bench
+from hexapod_cosim.extensions.identify.numbers.servo import TERMS
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.servos.motor import friction_budget, motor_torque
@@ -34,18 +42,46 @@ PRESETS = {
     "sts3215": ("sts3215_m1", "sts3215_12v"),
     "sts3250": ("sts3250",),
 }
-TRAJECTORIES = ("lift_and_drop", "sin_sin", "sin_time_square")
-MOST = 72  # logs of a servo
-COLUMNS = ("servo", "logs", "angle_deg", "speed_rad_s", "duty", "torque", "bam_angle_deg")
+MODELS = {"xl330": tuple(TERMS), "sts3215": ("m1", "m3", "m4"), "sts3250": ("m1", "m3", "m4")}
+TRAJECTORIES = ("lift_and_drop", "sin_sin", "sin_time_square")  # of K-Scale's five
+SEEN = ((0.535, 0.969), (8.0, 16.0, 32.0))  # masses [kg] and gains of K-Scale's that fits see
+MOST = 72  # logs of a servo that a fit or a preset is judged on
+COLUMNS = (
+    "servo", "judged_on", "logs", "angle_deg", "speed_rad_s", "duty", "torque", "bam_angle_deg",
+)  # fmt: skip
 
 
 def found_logs(folder: Path | None, motor: str) -> list[BenchLog]:
-    """Returns the logs of a motor in a folder and those below it, at most MOST, evenly chosen."""
+    """Returns the logs of a motor in a folder and those below it."""
     paths = sorted(folder.rglob("*.json")) if folder else []
     logs = [read_bench_log(path) for path in paths if motor in _motors(path)]
-    if motor != "xl330":
-        logs = [log for log in logs if log.trajectory in TRAJECTORIES]
-    return logs[:: max(1, -(-len(logs) // MOST))]
+    return [log for log in logs if motor == "xl330" or log.trajectory in TRAJECTORIES]
+
+
+def run(log: BenchLog) -> tuple[float, float, float, str]:
+    """Returns what repetitions of a run have in common."""
+    return (log.mass, log.length, log.register, log.trajectory)
+
+
+def some(logs: Sequence[BenchLog]) -> list[BenchLog]:
+    """Returns at most MOST logs, evenly chosen."""
+    return list(logs[:: max(1, -(-len(logs) // MOST))])
+
+
+def divided(logs: Sequence[BenchLog]) -> dict[str, list[Split]]:
+    """Returns the logs that fits see and those that they are judged on, by how they differ."""
+    if logs[0].motor == "xl330":
+        return {"gains held out in turn": splits(logs, "gain")}
+    masses, gains = SEEN
+    own, others = [], []
+    for log in logs:
+        (own if log.mass in masses and log.register in gains else others).append(log)
+    runs = {run(log): log for log in reversed(own)}  # the first of the repetitions
+    short, long = ([log for log in runs.values() if log.length == m] for m in (0.1, 0.15))
+    return {
+        "other masses or gains": [([*short, *long], some(others))],
+        "0.15 m, fitted to 0.1 m": [(short, long)],
+    }
 
 
 def _motors(path: Path) -> tuple[str, ...]:
@@ -83,9 +119,46 @@ def bam_angle(servo: Servo, bench: Bench, offset: float, delay: float) -> float:
     )
 
 
-def compared(name: str, logs: Sequence[BenchLog], pictures: Path | None) -> dict[str, str]:
+def repeated(motor: str, logs: Sequence[BenchLog]) -> dict[str, str]:
+    """Returns the row of how far the second of two repetitions is from the first."""
+    first: dict[Any, BenchLog] = {}
+    pairs = [(first.setdefault(run(log), log), log) for log in logs]
+    angles = [
+        np.degrees(np.mean(np.abs(np.interp(one.time, other.time, other.angle) - one.angle)))
+        for one, other in pairs
+        if one is not other
+    ]
+    return _row(motor, "a second run of the same", len(angles), [float(np.mean(angles))])
+
+
+def fitted(
+    motor: str, model: str, judged_on: str, parts: Sequence[Split], pool: Executor
+) -> dict[str, str]:
+    """Returns the row of fits of a friction model, each judged on logs that it did not see."""
+    seen, unseen = zip(*parts, strict=True)
+    robot = with_start(load_robot("athena"), seen[0])
+    found = pool.map(fitted_and_judged, seen, unseen, repeat(robot), repeat(model))
+    errors = [error for own in found for error in own]
+    mean = Errors.mean(errors)
+    return _row(
+        f"{motor}, {model} fitted",
+        judged_on,
+        len(errors),
+        [mean.angle, mean.speed, mean.duty, mean.torque],
+    )
+
+
+def _row(servo: str, judged_on: str, logs: int, numbers: Sequence[float]) -> dict[str, str]:
+    """Returns a row with the numbers that it has."""
+    texts = [servo, judged_on, str(logs), *(f"{number:.3g}" for number in numbers)]
+    return dict(zip_longest(COLUMNS, texts, fillvalue=""))
+
+
+def compared(
+    name: str, judged_on: str, logs: Sequence[BenchLog], pictures: Path | None
+) -> dict[str, str]:
     """Returns the row of a preset; offset and delay of the bench are fitted to the logs."""
-    servo = replace(measured_servo(name).servo, overload_time=0.0)
+    servo = measured_servo(name).servo
     fitted = fit_servo(logs, replace(load_robot("athena"), servo=servo), None, seeds=1)
     bench = Bench(logs)
     swing = fitted.swing(bench)
@@ -99,9 +172,32 @@ def compared(name: str, logs: Sequence[BenchLog], pictures: Path | None) -> dict
             figure = drawn(BenchReplay(one, fitted.swing(one), servo, errors[k]))
             path = pictures / f"servo-{name}-{word}.png"
             figure.savefig(path, dpi=120, metadata={"Software": None})
-    texts = [f"{value:.3g}" for value in (mean.angle, mean.speed, mean.duty, mean.torque)]
-    row = [name, str(len(logs)), *texts, f"{bam_angle(servo, bench, *values):.3g}"]
-    return dict(zip(COLUMNS, row, strict=True))
+    numbers = [mean.angle, mean.speed, mean.duty, mean.torque, bam_angle(servo, bench, *values)]
+    return _row(name, judged_on, len(logs), numbers)
+
+
+def found_rows(
+    kscale: Path | None, pictures: Path | None, pool: Executor
+) -> Iterator[dict[str, str]]:
+    """Yields the rows of the motors that there are logs of."""
+    for motor, presets in PRESETS.items():
+        logs = found_logs(XL330 if motor == "xl330" else kscale, motor)
+        if not logs:
+            print(f"{motor}: no logs here; see {XL330} and --kscale")
+            continue
+        divisions = divided(logs)
+        judged_on, (*_, (_, unseen)) = next(iter(divisions.items()))
+        if motor == "xl330":
+            judged_on, unseen = "all logs", logs
+        for name in presets:
+            yield compared(name, judged_on, unseen, pictures if name == "xl330_fitted" else None)
+        models = MODELS[motor]
+        for judged_on, parts in divisions.items():
+            for model in models:
+                yield fitted(motor, model, judged_on, parts, pool)
+            models = models[-1:]  # of the further divisions
+        if motor != "xl330":
+            yield repeated(motor, logs)
 
 
 def main() -> int:
@@ -110,16 +206,13 @@ def main() -> int:
     parser.add_argument("--kscale", type=Path, help="folder of K-Scale's raw logs")
     parser.add_argument("--pictures", type=Path, help="where to draw two logs of xl330_fitted")
     parser.add_argument("-o", "--output", type=Path, help="CSV file")
+    parser.add_argument("--workers", type=int, default=2, help="processes that fit")
     given = parser.parse_args()
-    rows = []
-    for motor, presets in PRESETS.items():
-        logs = found_logs(XL330 if motor == "xl330" else given.kscale, motor)
-        if not logs:
-            print(f"{motor}: no logs here; see {XL330} and --kscale")
-            continue
-        for name in presets:
-            rows.append(compared(name, logs, given.pictures if name == "xl330_fitted" else None))
-            print(", ".join(f"{key} {value}" for key, value in rows[-1].items()), flush=True)
+    rows: list[dict[str, str]] = []
+    with ProcessPoolExecutor(given.workers, mp_context=get_context("spawn")) as pool:
+        for row in found_rows(given.kscale, given.pictures, pool):
+            rows.append(row)
+            print(", ".join(f"{key} {value}" for key, value in row.items() if value), flush=True)
     if given.output and rows:
         given.output.parent.mkdir(parents=True, exist_ok=True)
         with given.output.open("w", encoding="utf-8", newline="") as file:

@@ -3,14 +3,14 @@
 C: compliance.h. Every period consists of these steps:
 
 1. Contacts. The detector decides which feet touch the ground (C23). If a contact contradicts the
-   plan, a sensor may be wrong (C34) or the ground may be higher or lower than planned (C35, C36).
+   plan, a sensor may be wrong and is replaced (C34), or the ground is higher or lower (C35, C36).
 2. Deviations. The planned forces are subtracted from the measured ones (C24). They tell whether the
    robot slides (C33) and how much of the planned squeeze the ground holds (C46, C52).
 3. Weight. The plan is scaled by the measured weight (C30), so that a payload is carried too.
 4. Torques. They are those of the planned load (C29).
 
-When the whole robot slides, its joints cannot follow or it is far too heavy, `trust` goes to 0 and
-the robot walks under kinematic control (C33).
+When the whole robot slides or is far too heavy, `trust` goes to 0 and the robot walks under
+kinematic control (C33).
 """
 
 from __future__ import annotations
@@ -26,12 +26,14 @@ from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, along, clam
 from hexapod_cosim.controller.sense.burden import Burden
 from hexapod_cosim.controller.sense.contact_detection import ContactDetector
 from hexapod_cosim.controller.sense.touchdown import EARLY, REACH_LIMIT, Landings, Touchdown
-from hexapod_cosim.controller.sense.trust import SensorWatch, Trust
+from hexapod_cosim.controller.sense.trust import SensorWatch, Trust, replaced
 
 SETTLED_SHARE = 0.5  # 1    of the weight: feet that carry less together have only just landed
 GRIPPED = 0.99  # 1    of its share: a leg with more carries it
 LOAD_FLOOR = 1e-6  # N    a smaller sum of loads cannot be divided by
 LEAST_SCALE, LARGEST_SCALE = 0.5, 3.0  # 1    measured over modelled weight that is believed
+LIKELY = 1.2  # 1    of its planned load, or a third of the weight: a doubted foot bears no more
+WEIGHED = 0.9  # 1    of the heft, which changes faster: a larger scale has settled
 CARRYING = 0.1  # 1    in thirds of the weight: an awaited foot with more stands
 LARGEST_LEAN = 0.4  # 1    of the depth of the ground: distance of the centre of mass, each axis
 HIGH_SHARE = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
@@ -41,22 +43,25 @@ class Compliance(Stateful):
     """Force laws of all feet.
 
     Attributes, (6,) unless stated otherwise:
-        detector, watch, touchdown, landings, burden, trust: components with a state of their own.
+        detector, watch, touchdown, landings, burden, trust: components with states.
         load: smoothed load of the feet in thirds of the weight [1].
         torque: (6, 3) feed-forward torques of the servos [N m].
-        doubted: sensors that are replaced by the plan.
-        fallback: legs that walk without feedback.
+        touching: feet on the ground.
+        doubted: sensors that are replaced.
+        misled: feet that follow their paths: their sensors have just been doubted, or all are.
+        fallback: legs under kinematic control.
         grip: factor on the planned load of a leg that is regaining contact [1].
         regaining: some grip may be below 1 (scalar).
         scale: measured over planned weight (scalar) [1].
-        lean: horizontal distance of the measured centre of mass from the modelled one, walking
-            frame, x + i y (scalar) [m].
-        held: share of the planned squeeze that the ground holds, smoothed (scalar) [1].
+        lean: of the measured centre of mass from the modelled one, x + i y (scalar) [m].
+        held: share of the planned squeeze that the ground holds (scalar) [1].
+        sure: scale, lean and heft before a sensor contradicted the plan (scalars).
     """
 
     STATE = (
         "detector", "watch", "touchdown", "landings", "burden", "trust", "load", "torque",
-        "doubted", "fallback", "grip", "regaining", "scale", "lean", "held",
+        "touching", "doubted", "misled", "fallback", "grip", "regaining", "scale", "lean", "held",
+        "sure",
     )  # fmt: skip
 
     def __init__(
@@ -100,14 +105,10 @@ class Compliance(Stateful):
         ):  # fmt: skip
             part.reset()
         self.load, self.torque = np.zeros(LEGS), np.zeros((LEGS, 3))
-        self.doubted, self.fallback = np.zeros((2, LEGS), dtype=np.bool_)
+        self.touching, self.doubted, self.misled, self.fallback = np.zeros((4, LEGS), np.bool_)
         self.grip, self.regaining = np.ones(LEGS), False
         self.scale, self.lean, self.held = 0.0, 0j, 1.0
-
-    @property
-    def touching(self) -> Mask:
-        """Returns the feet (6,) on the ground; a doubted sensor is replaced by the plan."""
-        return self.detector.touching
+        self.sure = 1.0, 0j, 1.0
 
     @property
     def heft(self) -> float:
@@ -121,24 +122,33 @@ class Compliance(Stateful):
     # ------------------------------------------------------------------------------ contacts
 
     def _replace_forces(self, plan: LoadPlan, force: Array) -> Array:
-        """Returns the forces (6, 3) [N], with those of doubted sensors replaced by the plan."""
-        planned = plan.shares.activation > 0.5
-        self.detector.touching = np.where(self.doubted, planned, self.touching)
-        return np.where(self.doubted[:, None], self.scale * plan.shares.forces(), force)
+        """Returns the forces (6, 3) [N], with those of doubted sensors replaced (C34)."""
+        before, self.touching = self.touching, self.detector.touching
+        if not self.doubted.any():
+            return force
+        force = replaced(force, self.scale * plan.shares.forces(), self.touching, self.doubted)
+        found = self.watch.found(force[:, 2], before)
+        found = plan.shares.activation > 0.5 if self.doubted.all() else found
+        self.touching = np.where(self.doubted, found, self.touching)
+        return force
 
-    def _judge_sensors(self, plan: LoadPlan, met: Array, force: Array) -> Array:
+    def _judge_sensors(self, plan: LoadPlan, met: Array, force: Array, reported: float) -> None:
         """Decides which sensors are doubted (C34): all of them once a tripod's are.
 
-        met: (6,) heights at which the feet are expected to meet the ground [m]. Returns the forces
-        (6, 3) that the laws use [N].
+        met: (6,) heights at which the feet are expected to meet the ground [m]; force: (6, 3) that
+        the laws use; reported: sum of the normal forces that the sensors report [N].
         """
-        total = float(force[self.touching, 2].sum())
         high = plan.height > self.high + met
-        due = plan.standing | plan.awaited
-        doubted = self.watch.look(self.touching, total, due, high)
-        self.doubted = doubted | (np.count_nonzero(doubted) >= TRIPOD_LEGS)
-        self.fallback = self.doubted | (self.trust.level < 1.0)
-        return self._replace_forces(plan, force) if doubted.any() else force
+        most = np.maximum(self.share, LIKELY * self.scale * plan.shares.normal)
+        known = float(np.minimum(force[:, 2], most)[self.doubted & ~high].sum())
+        total = np.where(self.doubted, reported, reported + known)
+        doubted = self.watch.look(self.detector.touching, total, plan.standing | plan.awaited, high)
+        doubted = doubted | (blind := np.count_nonzero(doubted) >= TRIPOD_LEGS)
+        fresh = doubted & ~self.doubted
+        if fresh.any():
+            self.scale, self.lean, self.burden.heft = self.sure
+        self.misled = (self.misled | fresh) & doubted & (plan.height <= EARLY) | blind
+        self.doubted = doubted
 
     def _carries(self) -> Mask:
         """Returns the feet (6,) that carry so much that the gait clock need not wait for them."""
@@ -149,30 +159,25 @@ class Compliance(Stateful):
         self.regaining = True
         early = self.landings.early(met, plan.height)
         falling = np.where(early, plan.descent, 0.0)
-        searching = plan.awaited & ~self.doubted & ~self._carries()
+        searching = plan.awaited & ~self.misled & ~self._carries()
         self.touchdown.step(
-            self.touching, falling, plan.swinging, plan.standing, searching, self.doubted
+            self.touching, falling, plan.swinging, plan.standing, searching, self.misled
         )
 
-    def _examine_contacts(self, plan: LoadPlan, force: Array) -> Array:
-        """Decides between a wrong sensor and an early or late contact.
-
-        Returns the forces (6, 3) that the laws use [N].
-        """
+    def _examine_contacts(self, plan: LoadPlan, force: Array, reported: float) -> None:
+        """Decides between a wrong sensor and an early or late contact; as _judge_sensors()."""
         met = self.landings.expected(self.touching, plan.height, plan.swinging)
         if self.parts.fallback:
-            force = self._judge_sensors(plan, met, force)
+            self._judge_sensors(plan, met, force, reported)
         if self.trust.level < 1.0:
             self.touchdown.reset()
         elif self.parts.touchdown:
             self._meet_ground(plan, met)
-        return force
 
     def _contacts_differ(self, plan: LoadPlan) -> bool:
         """Returns whether contacts contradict the plan, or a response to it is still under way."""
-        certain = plan.standing | (plan.height > EARLY)
-        differs = ((self.touching != plan.standing) & certain | plan.awaited).any()
-        return bool(differs) or self.watch.busy() or self.touchdown.busy()
+        wrong = (self.touching != plan.standing) & (plan.standing | (plan.height > EARLY))
+        return bool((wrong | plan.awaited).any()) or self.watch.busy() or self.touchdown.busy()
 
     # ------------------------------------------------------------------------ inputs and weight
 
@@ -183,16 +188,15 @@ class Compliance(Stateful):
         it is 0.
         """
         planned = np.where(self.touching, self.scale * plan.shares.squeeze, 0.0)
-        whole = float(square(planned).sum())
-        if whole <= LOAD_FLOOR:
+        if (whole := float(square(planned).sum())) <= LOAD_FLOOR:
             return 0.0
         return min(max(-float(along(planned, deviation).sum()) / whole, 0.0), 1.0)
 
     def _feel(self, plan: LoadPlan, force: Array) -> tuple[Array, float]:
         """Returns the normal forces (6,) and their sum [N].
 
-        It updates trust (C33), the smoothed loads (C27) and the share of the planned squeeze that
-        is held (C52) by the deviations of the tangential forces (C24).
+        It updates trust (C33), smoothed loads (C27) and the held share of the planned squeeze (C52)
+        by the deviations of the tangential forces (C24).
         """
         horizontal = force[:, 0] + 1j * force[:, 1]
         deviation = np.where(self.touching, horizontal - self.scale * plan.shares.push, 0.0)
@@ -200,10 +204,8 @@ class Compliance(Stateful):
         total = float(normal.sum())
         if self.parts.fallback:
             drag = abs(deviation.sum()) / total if total > max(self.settled, LOAD_FLOOR) else 0.0
-            before, heavy = self.trust.level, self.burden.overburdened
-            goal = self.trust.step(drag, overspeed=plan.overspeed, overburdened=heavy)
-            if before != goal:
-                self.fallback = self.doubted | (goal == 0.0)
+            goal = self.trust.step(drag, overburdened=self.burden.overburdened)
+            self.fallback = np.full(LEGS, goal == 0.0)
         self.load = self.load + self.follow_load * (normal / self.share - self.load)
         missing = self._squeeze_lost(plan, deviation)
         self.held += self.follow_cycle * (1.0 - missing - self.held)
@@ -229,6 +231,8 @@ class Compliance(Stateful):
 
         normal: (6,) measured normal forces [N]; total: their sum [N].
         """
+        if self.scale > WEIGHED * self.burden.heft and not self.watch.contradicted.any():
+            self.sure = self.scale, self.lean, self.burden.heft
         if not self.doubted.any():
             ratio = total / max(plan.weight, LOAD_FLOOR)
             scale = min(max(ratio, LEAST_SCALE), LARGEST_SCALE)
@@ -264,36 +268,30 @@ class Compliance(Stateful):
         return self.touchdown.offset, self.touchdown.busy()
 
     def meets(self) -> Mask:
-        """Returns the feet (6,) that have met the ground on their way down (C51).
-
-        A sensor that is doubted is left out.
-        """
-        if not self.parts.touchdown or self.trust.level < 1.0:
-            return np.zeros(LEGS, dtype=np.bool_)
-        return self.touching & ~self.doubted
+        """Returns the feet (6,) that have met the ground on their way down (C51)."""
+        return self.touching & ~self.misled & (self.parts.touchdown and self.trust.level == 1.0)
 
     def waits(self, landing: Mask, *, waiting: bool) -> bool:
         """Returns whether the gait clock waits for the feet of legs that end their swing (C50).
 
-        It does not wait for joints that are too slow: their feet are late on level ground too.
-
         landing: (6,) these legs; waiting: it waits already.
         """
-        if not self.parts.touchdown or self.trust.level < 1.0 or self.trust.feet_late():
+        if not self.parts.touchdown or self.trust.level < 1.0:
             return False
         found = self._carries() if waiting else self.touching
         hopeful = self.touchdown.offset > -REACH_LIMIT
-        return bool((landing & ~found & ~self.doubted & hopeful).any())
+        return bool((landing & ~found & ~self.misled & hopeful).any())
 
     def step(self, plan: LoadPlan, force: Array) -> None:
         """Advances all laws by one period.
 
         force: (6, 3) of the ground on the feet, walking frame [N].
         """
-        self.detector.step(force[:, 2])
+        reported = float(force[self.detector.step(force[:, 2]), 2].sum())
+        force = self._replace_forces(plan, force)
         self.landings.look(self.touching, plan.height, plan.swinging)
         if self._contacts_differ(plan):
-            force = self._examine_contacts(plan, force)
+            self._examine_contacts(plan, force, reported)
         normal, total = self._feel(plan, force)
         self._update_weight(plan, normal, total)
         self._actuate(plan)

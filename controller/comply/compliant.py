@@ -152,7 +152,6 @@ class Compliant(Stateful):
         rise: Array,
         swinging: Mask,
         awaited: Mask,
-        overspeed: bool,
     ) -> LoadPlan:
         """Returns the planned loads of feet (6,) x + i y, walking frame [m] (C19, C20, C42).
 
@@ -169,7 +168,6 @@ class Compliant(Stateful):
             rise=rise,
             swinging=swinging,
             awaited=awaited,
-            overspeed=overspeed,
             period=self.period,
         )
 
@@ -275,6 +273,7 @@ class Compliant(Stateful):
         self.adaptation.step(laws.torque, laws.needed(), laws.held)
         if busy or self.moving:
             rise = (offset - self.offset) * self.per_second
-            output.speed_ref[...] += climb * rise[:, None]
+            speed, most = output.speed_ref + climb * rise[:, None], self.legs.speed_max
+            output.speed_ref[...] = clamp(speed, -most, most)
             self.offset, self.moving = offset, busy
         return raised

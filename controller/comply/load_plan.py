@@ -70,7 +70,6 @@ class LoadPlan(NamedTuple):
     swinging: Mask  # planned in the air
     awaited: Mask  # the gait clock waits for the foot
     descent: Array  # m    by which the feet come down in a period, at least 0
-    overspeed: bool  # scalar: the plan exceeds the speed limit of some joint
 
 
 def plan_load(
@@ -83,7 +82,6 @@ def plan_load(
     rise: Array,
     swinging: Mask,
     awaited: Mask,
-    overspeed: bool,
     period: float,
 ) -> LoadPlan:
     """Returns the planned loads and contacts of a step.
@@ -96,7 +94,6 @@ def plan_load(
         height, rise: (6,) of the paths over the stance [m, m/s].
         swinging: (6,) legs planned in the air.
         awaited: (6,) feet that the gait clock waits for.
-        overspeed: the plan exceeds the speed limit of some joint.
         period: of the controller [s].
     """
     supports = 1.0 if active else 0.0
@@ -113,5 +110,4 @@ def plan_load(
         swinging=swinging,
         awaited=awaited,
         descent=np.maximum(-period * rise, 0.0),
-        overspeed=overspeed,
     )

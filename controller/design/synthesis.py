@@ -18,12 +18,7 @@ from hexapod_cosim.controller.design.paper import (
     design_paper,
     meets,
 )
-from hexapod_cosim.controller.gains import (
-    Gains,
-    GainsError,
-    Margins,
-    Requirements,
-)
+from hexapod_cosim.controller.gains import Gains, GainsError, Margins, Requirements
 from hexapod_cosim.controller.gains_file import raising_gains_errors
 from hexapod_cosim.controller.size import requirements_for, sections_for
 from hexapod_cosim.models import LEG_NAMES, Robot

@@ -5,8 +5,8 @@ stance. A foot that finds no ground at the end of its path moves down at a fixed
 In the next swing these offsets decay.
 A foot for which the gait clock waits reaches this speed slowly (C50): a force that is known late
 must not let a foot that stands push the torso up.
-A foot whose sensor is doubted follows its path: what its sensor said, or did not say, was the
-reason for its offset, which decays at once.
+A foot whose sensor has just been doubted follows its path until its next swing: what its sensor
+said, or did not say, was the reason for its offset, which decays at once.
 
 The ground is met early above the height at which it is expected (C35). On level ground with the
 torso as planned this height is 0. A torso that sags or leans, or ground that yields, lets all feet
@@ -80,7 +80,7 @@ class Touchdown(Stateful):
         swinging: Mask,
         loaded: Mask,
         searching: Mask,
-        doubted: Mask,
+        misled: Mask,
     ) -> None:
         """Advances the offsets by one period (C36).
 
@@ -91,12 +91,12 @@ class Touchdown(Stateful):
             swinging: (6,) legs planned in the air.
             loaded: (6,) legs planned to carry their whole share.
             searching: (6,) feet that the gait clock waits for.
-            doubted: (6,) feet whose sensors are not trusted.
+            misled: (6,) feet whose sensors have just been doubted.
         """
-        self.late = np.where(loaded & ~touching & ~doubted, self.late + self.period, 0.0)
+        self.late = np.where(loaded & ~touching & ~misled, self.late + self.period, 0.0)
         self.waited = np.where(searching, self.waited + self.period, 0.0)
         moved = self._moved(touching, falling, swinging, searching)
-        self.offset = np.where(doubted, self._faded(), moved)
+        self.offset = np.where(misled, self._faded(), moved)
 
 
 def _least_of_others(values: Array) -> Array:

@@ -1,12 +1,12 @@
 """Decides whether the planned load and the force sensors can be trusted (C33, C34). C: trust.h.
 
-The planned load does not apply to a robot that slides, whose joints cannot follow, or that is far
-too heavy. Then the trust, a factor on all torques, goes to 0 and the robot walks under kinematic
-control.
+The planned load does not apply to a robot that slides or is far too heavy. Then the trust, a factor
+on all torques, goes to 0 and the robot walks under kinematic control.
 
 A sensor is doubted when it contradicts the plan for too long: it reports a force on a foot in the
 middle of its swing, or none on a foot that should carry its load while all feet together lack
-weight. It is trusted again after one and a half gait cycles without a contradiction.
+weight. It is trusted again after one and a half gait cycles without a contradiction. Until then the
+load of its foot is what the other feet leave of the weight.
 """
 
 from __future__ import annotations
@@ -16,18 +16,20 @@ import math
 import numpy as np
 
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Mask
+from hexapod_cosim.controller.plane import LEGS, Array, Mask
 
 SLIDING_DRAG = 0.55  # 1    common tangential over normal force beyond the plan: only a robot that
 # slides exceeds it, or one on a slope of 29 degrees
 CALM_CYCLES = 0.5  # 1    gait cycles without sliding until the feet are trusted again
 SLIDING_TIME = 0.04  # s    longer than a foot skids when it touches down
-JOINTS_FOLLOW, JOINTS_DO_NOT = 0.35, 0.45  # 1    share of the time with too high joint speeds
-FEET_LATE = 0.2  # 1    the same, from which feet end their swings late whatever the ground
 TRUSTED = 0.99  # 1    so near to its goal the trust is at it
 AIRBORNE_TIME = 0.06  # s    longest plausible force on a foot in mid-swing
 ABSENT_TIME = 0.10  # s    longest plausible lack of force on a standing foot; both exceed the lag
 MISSING_SHARE = 0.92  # 1    of the weight: with less, the force of some foot is not reported
+# 1    of the weight: as TOUCH_SHARE, LIFT_SHARE, for a doubted foot; more, because torso and feet
+# accelerate
+FOUND_PART, GONE_PART = 0.10, 0.03
+LEAST_SHARE = 1e-6  # N    of a doubted foot, so that the shares of feet in the air are not 0 / 0
 MEMORY_CYCLES = 1.5  # 1    gait cycles without contradiction until a sensor is trusted again
 
 
@@ -36,46 +38,36 @@ class Trust(Stateful):
 
     Attributes:
         level: factor on all torques [1].
-        lagging: the joints cannot follow the plan.
-        overspeed_share: share of the time in which the plan exceeds a speed limit [1].
         slide_periods: periods for which the robot has been sliding.
         recovery_periods: periods that remain until feedback resumes after sliding.
     """
 
-    STATE = ("level", "lagging", "overspeed_share", "slide_periods", "recovery_periods")
+    STATE = ("level", "slide_periods", "recovery_periods")
 
     def __init__(self, *, cycle: float, period: float, load_time: float) -> None:
         """Trusts the plan. cycle: of the gait [s]; load_time: smoothing of the trust [s]."""
         self.period = period
         self.follow_load = 1.0 - math.exp(-period / load_time)
-        self.follow_cycle = 1.0 - math.exp(-period / cycle)
         self.calm = round(CALM_CYCLES * cycle / period)  # periods
         self.reset()
 
     def reset(self) -> None:
         """Trusts the plan wholly."""
-        self.level, self.lagging, self.overspeed_share = 1.0, False, 0.0
+        self.level = 1.0
         self.slide_periods, self.recovery_periods = 0, 0
 
-    def feet_late(self) -> bool:
-        """Returns whether the joints are so slow that feet end their swings late anywhere."""
-        return self.overspeed_share > FEET_LATE
-
-    def step(self, drag: float, *, overspeed: bool, overburdened: bool) -> float:
+    def step(self, drag: float, *, overburdened: bool) -> float:
         """Advances the trust by one period (C33) and returns the level that it goes to, 0 or 1.
 
         drag: common tangential force of the feet above the plan, over the normal force [1];
-        overspeed: the plan exceeds the speed limit of some joint; overburdened: the robot is far
-        too heavy for its servos.
+        overburdened: the robot is far too heavy for its servos.
         """
-        self.overspeed_share += self.follow_cycle * (float(overspeed) - self.overspeed_share)
-        self.lagging = self.overspeed_share > (JOINTS_FOLLOW if self.lagging else JOINTS_DO_NOT)
         self.slide_periods = self.slide_periods + 1 if drag > SLIDING_DRAG else 0
         if self.slide_periods * self.period > SLIDING_TIME:
             self.recovery_periods = self.calm
         elif self.recovery_periods:
             self.recovery_periods -= 1
-        goal = 0.0 if self.recovery_periods or self.lagging or overburdened else 1.0
+        goal = 0.0 if self.recovery_periods or overburdened else 1.0
         if self.level != goal:
             self.level += self.follow_load * (goal - self.level)
             if abs(goal - self.level) < 1.0 - TRUSTED:
@@ -98,7 +90,7 @@ class SensorWatch(Stateful):
 
         weight: of the robot without payload [N]; cycle: of the gait [s]; period [s].
         """
-        self.period, self.missing = period, MISSING_SHARE * weight
+        self.period, self.weight, self.missing = period, weight, MISSING_SHARE * weight
         self.memory = MEMORY_CYCLES * cycle
         self.reset()
 
@@ -115,12 +107,12 @@ class SensorWatch(Stateful):
         """Returns the sensors (6,) that are not trusted."""
         return self.left > 0.0
 
-    def look(self, touching: Mask, total: float, standing: Mask, high: Mask) -> Mask:
+    def look(self, touching: Mask, total: Array | float, standing: Mask, high: Mask) -> Mask:
         """Advances the times by one period and returns `doubted`.
 
         Args:
             touching: (6,) feet that report a force.
-            total: the sum of all normal forces [N].
+            total: the sum of all normal forces [N]; or (6,) that for each foot.
             standing: (6,) legs that are planned to carry their whole share.
             high: (6,) feet that are planned well above the ground.
         """
@@ -131,3 +123,28 @@ class SensorWatch(Stateful):
         rest = np.maximum(self.left - self.period, 0.0)
         self.left = np.where(too_long, self.memory, rest)
         return self.doubted
+
+    def found(self, load: Array, touching: Mask) -> Mask:
+        """Returns which feet (6,) have contact if their sensors are doubted (C34).
+
+        load: (6,) that replaces the measured one [N]; touching: (6,) a period ago.
+        """
+        return np.asarray(load > np.where(touching, GONE_PART, FOUND_PART) * self.weight)
+
+
+def replaced(force: Array, planned: Array, touching: Mask, doubted: Mask) -> Array:
+    """Returns the forces (6, 3) [N], with those of the doubted feet replaced (C34).
+
+    Doubted feet carry what the others leave of the weight, in the shares of the plan.
+
+    Args:
+        force: (6, 3) that the sensors report [N].
+        planned: (6, 3) for the measured weight [N].
+        touching: (6,) feet that report a force.
+        doubted: (6,) feet, of which there is one at least.
+    """
+    left = float(planned[:, 2].sum()) - float(force[touching & ~doubted, 2].sum())
+    shares = np.where(doubted, planned[:, 2] + LEAST_SHARE, 0.0)
+    load = max(left, 0.0) * shares / shares.sum()
+    guess = np.column_stack((planned[:, :2], load))
+    return np.where(doubted[:, None], guess, force)

@@ -128,7 +128,7 @@ class FootPaths(Stateful):
         self.narrowing = 0.0
         return self._rest(self.home)
 
-    def _aims(self) -> Plane:
+    def aims(self) -> Plane:
         """Returns the stance positions (6,) that the steps aim at, walking frame [m] (C53)."""
         return np.asarray(self.home + self.narrowing * self.inward)
 
@@ -141,7 +141,7 @@ class FootPaths(Stateful):
         """
         landed = swung & self.clock.standing
         feet = np.where(landed, cis(-now.turn) * (now.goal - now.way), now.plane)
-        return self.clock.skip(np.abs(feet - self._aims()) < HOME_TOLERANCE), feet
+        return self.clock.skip(np.abs(feet - self.aims()) < HOME_TOLERANCE), feet
 
     def _ground_of(self, feet: PlannedFeet) -> Plane:
         """Returns the feet (6,) in the ground frame [m] (C5)."""
@@ -154,7 +154,7 @@ class FootPaths(Stateful):
         """
         away = self.clock.absent
         if away.any():  # these feet are above their stance positions
-            place = feet.way + cis(feet.turn) * self._aims()
+            place = feet.way + cis(feet.turn) * self.aims()
             feet = feet._replace(
                 goal=np.where(away, place, feet.goal), pull=np.where(away, 0.0, feet.pull)
             )
@@ -241,7 +241,7 @@ class FootPaths(Stateful):
         walk [cycles].
         """
         time, motion = self._lift_offs(begin), _ground_motion(feet)
-        far = np.abs(feet.plane - motion * time - self._aims())
+        far = np.abs(feet.plane - motion * time - self.aims())
         return float(far[~self.clock.absent].max())
 
     def _steadiness(
@@ -252,7 +252,7 @@ class FootPaths(Stateful):
         feet, begin: as for _farthest(); torso: its way from its nominal place [m].
         """
         lift, motion = self._lift_offs(begin), _ground_motion(feet)
-        ahead = self._aims() + motion * (self.landing_lead + lift)
+        ahead = self.aims() + motion * (self.landing_lead + lift)
         least = np.inf
         for leg in np.flatnonzero(~self.clock.absent):
             for time in (lift[leg], lift[leg] + self.swing_time):
@@ -295,7 +295,7 @@ class FootPaths(Stateful):
     def _landing(self, tau: Array, twist: Twist) -> Plane:
         """Returns the landing points (6,) in the walking frame [m] (C4, C53)."""
         ahead = self.landing_lead - tau * self.swing_time
-        return np.asarray(cis(twist.yaw_rate * ahead) * self._aims() + travel(twist, ahead))
+        return np.asarray(cis(twist.yaw_rate * ahead) * self.aims() + travel(twist, ahead))
 
     def _odometry(self, before: PlannedFeet, twist: Twist) -> tuple[complex, float]:
         """Returns position [m] and heading [rad] of the walking frame in the ground frame (C3)."""

@@ -15,11 +15,7 @@ from hexapod_cosim.cosim.cli.failures import EPILOG
 CLI = "hexapod_cosim.cosim.cli"
 # name, line in the list of commands, place in cosim/cli
 CORE = (
-    (
-        "export",
-        "Write the FMU of a robot, its controller, or a package.",
-        "export_command:export",
-    ),
+    ("export", "Write the FMU of a robot, its controller, or a package.", "export_command:export"),
     ("simulate", "Run one co-simulation: results, metrics, plots.", "run_commands:simulate"),
     ("compare", "Run walks under several controls and report them.", "run_commands:compare"),
     ("design", "Design the gains of compliant and paper control.", "design_command:design"),

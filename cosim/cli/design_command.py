@@ -21,9 +21,7 @@ MacroStep = Annotated[
 RequirementSettings = Annotated[
     list[str] | None,
     typer.Option(
-        "--set",
-        metavar="REQUIREMENT=VALUE",
-        help="Ask for something else (phase_margin=50).",
+        "--set", metavar="REQUIREMENT=VALUE", help="Ask for something else (phase_margin=50)."
     ),
 ]
 DesignFolder = Annotated[

@@ -72,11 +72,7 @@ ControllerName = Annotated[
     ),
 ]
 GaitName = Annotated[
-    str | None,
-    typer.Option(
-        "--gait",
-        help="Of the controller: one of `hexapod list gaits`.",
-    ),
+    str | None, typer.Option("--gait", help="Of the controller: one of `hexapod list gaits`.")
 ]
 StanceName = Annotated[
     str,

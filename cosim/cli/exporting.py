@@ -29,10 +29,7 @@ class Format:
     write: Callable[[Robot], str]
 
 
-FORMATS = {
-    "urdf": Format(".urdf", robot_to_urdf),
-    "mjcf": Format(".xml", robot_to_mjcf),
-}
+FORMATS = {"urdf": Format(".urdf", robot_to_urdf), "mjcf": Format(".xml", robot_to_mjcf)}
 DEFAULT_CONTROL = "compliant"  # of a package
 SUFFIXES = {**{name: form.suffix for name, form in FORMATS.items()}, "ssp": ".ssp"}
 CONTROLLER_OPTIONS = ("gait", "gains", "period")
@@ -40,10 +37,7 @@ DESCRIPTION, PLANT_FMU = "a robot's description", "the plant's FMU"
 CONTROLLER_FMU, PACKAGE = "a controller's FMU", "a package"
 # options without effect, by what is written
 UNUSED_OPTIONS = {
-    DESCRIPTION: (
-        *("fmi", "platforms", "terrain", "stance", "controller"),
-        *CONTROLLER_OPTIONS,
-    ),
+    DESCRIPTION: (*("fmi", "platforms", "terrain", "stance", "controller"), *CONTROLLER_OPTIONS),
     PLANT_FMU: CONTROLLER_OPTIONS,
     CONTROLLER_FMU: ("terrain",),
     PACKAGE: ("terrain",),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -105,3 +106,17 @@ CheckAccuracy = Annotated[
         help="Walk again at a hundredth of the solver's tolerance: an error beside every metric.",
     ),
 ]
+
+
+def command_line(name: str, *words: object, **options: object) -> str:
+    """Returns the command `name` with words and options; those that are None or False are left out.
+
+    A list is an option for each of its items.
+    """
+    written = ["hexapod", name, *map(str, words)]
+    for key, value in options.items():
+        for item in value if isinstance(value, list) else [value]:
+            flag = f"--{key.replace('_', '-')}"
+            written += [] if item is None or item is False else [flag]
+            written += [] if item is None or isinstance(item, bool) else [str(item)]
+    return shlex.join(written)

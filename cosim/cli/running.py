@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
@@ -11,22 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.controller import Gains, load_gains
-from hexapod_cosim.cosim.cli.options import ENGINES
-from hexapod_cosim.cosim.cli.terminal import (
-    counting_bar,
-    progress_bar,
-    show_table,
-    waiting,
-    warn,
-)
+from hexapod_cosim.cosim.cli.options import ENGINES, command_line
+from hexapod_cosim.cosim.cli.terminal import counting_bar, progress_bar, show_table, waiting, warn
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
-from hexapod_cosim.cosim.results.accuracy import (
-    Accuracy,
-    compare_accuracy,
-    reference_scenario,
-)
+from hexapod_cosim.cosim.results.accuracy import Accuracy, compare_accuracy, reference_scenario
 from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.folder import ResultsFolder, write_result
 from hexapod_cosim.cosim.results.recordings import check_formats
@@ -84,13 +73,10 @@ class Words:
 
     def command(self, name: str, scenario: str) -> str:
         """Returns the command `name` that repeats the run of a scenario."""
-        words = [word for text in self.controls or [] for word in ("--control", text)]
-        words += [word for text in self.settings for word in ("--set", text)]
-        for key in ("seeds", "engine", "fmu", "gains"):
-            value = getattr(self, key)
-            words += [] if value is None else [f"--{key}", str(value)]
-        flags = ["--check-accuracy"] if self.accuracy else []
-        return shlex.join(["hexapod", name, scenario, *words, *flags])
+        return command_line(
+            name, scenario, control=self.controls, set=self.settings, seeds=self.seeds,
+            engine=self.engine, fmu=self.fmu, gains=self.gains, check_accuracy=self.accuracy,
+        )  # fmt: skip
 
 
 def checked_engine(name: str | None, *, runs: int) -> str:
@@ -114,10 +100,7 @@ def titled(plan: Scenario, settings: Sequence[str]) -> Scenario:
 
 
 def run_into(
-    plan: Scenario,
-    folders: Sequence[ResultsFolder],
-    command: str,
-    options: RunOptions,
+    plan: Scenario, folders: Sequence[ResultsFolder], command: str, options: RunOptions
 ) -> tuple[Result, list[Path]]:
     """Runs a scenario and writes its results into the last of the folders.
 
@@ -196,9 +179,7 @@ def chosen_controls(texts: Sequence[str], plan: Scenario) -> tuple[Control, ...]
 
 
 def check_accuracy(
-    plans: Sequence[Scenario],
-    runs: Sequence[Summary],
-    options: RunOptions,
+    plans: Sequence[Scenario], runs: Sequence[Summary], options: RunOptions
 ) -> Accuracy:
     """Returns the accuracy of runs of one control, whose results are in a folder already.
 

@@ -125,9 +125,7 @@ def terrain(
     values: Annotated[
         list[str] | None,
         typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="Set a parameter of the surface: step_height=30mm.",
+            "--set", metavar="KEY=VALUE", help="Set a parameter of the surface: step_height=30mm."
         ),
     ] = None,
     robot: RobotName = "athena",
@@ -141,8 +139,7 @@ def terrain(
 
 def examples(
     output: Annotated[
-        Path,
-        typer.Option("-o", "--output", metavar="DIR", help="New folder for the examples."),
+        Path, typer.Option("-o", "--output", metavar="DIR", help="New folder for the examples.")
     ] = Path("hexapod-examples"),
     json: Json = False,
 ) -> None:

@@ -98,12 +98,7 @@ def find_stance(robot: Robot, *, gait: Gait | None = None) -> StanceDesign:
 
 
 def _best_neighbour(
-    robot: Robot,
-    gait: Gait,
-    place: tuple[float, float],
-    size: float,
-    before: Walked,
-    heat: float,
+    robot: Robot, gait: Gait, place: tuple[float, float], size: float, before: Walked, heat: float
 ) -> tuple[tuple[float, float], tuple[Robot, Walked]] | None:
     """Returns the allowed neighbour of least heat below `heat`, with its robot and loads."""
     found = None
@@ -178,9 +173,7 @@ def _loads(robot: Robot, gait: Gait) -> tuple[Array, float]:
     legs, needs = LegSolver(robot), requirements_for(robot)
     dynamics = InverseDynamics(robot, legs, period=1.0)  # the period is not used without motion
     timing = SupportGains(
-        handover_time=needs.handover_time,
-        weight_time=needs.weight_time,
-        load_time=needs.load_time,
+        handover_time=needs.handover_time, weight_time=needs.weight_time, load_time=needs.load_time
     )
     support = Support(robot, gait, timing, rest=dynamics.rest())
     planned = PlannedSqueeze(friction=robot.friction.mu, weight=robot.weight, depth=-dynamics.floor)

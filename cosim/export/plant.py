@@ -24,27 +24,16 @@ from hexapod_cosim.cosim.common.plant_files import (
     source_files,
 )
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
-from hexapod_cosim.cosim.export.platforms import (
-    build_binaries,
-    choose_platforms,
-    component_library,
-)
+from hexapod_cosim.cosim.export.platforms import build_binaries, choose_platforms, component_library
 from hexapod_cosim.cosim.export.reference import reference_members
 from hexapod_cosim.cosim.export.start_values import start_values, with_starts
 from hexapod_cosim.cosim.interface.arrays import arrays
-from hexapod_cosim.cosim.interface.controller import (
-    ControllerSetup,
-    load_controller_interface,
-)
+from hexapod_cosim.cosim.interface.controller import ControllerSetup, load_controller_interface
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.interface.model_description3 import render_build_description, render_fmi3
 from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.cosim.interface.records import Interface
-from hexapod_cosim.cosim.interface.terminals import (
-    FOLDER,
-    ICON,
-    render_terminals,
-)
+from hexapod_cosim.cosim.interface.terminals import FOLDER, ICON, render_terminals
 from hexapod_cosim.models.errors import FmuError
 from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.grid_file import grid_bytes

@@ -15,10 +15,7 @@ from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.export.platforms import choose_platforms
 from hexapod_cosim.cosim.export.ssp import export_ssp
 from hexapod_cosim.cosim.export.start_values import with_starts
-from hexapod_cosim.cosim.interface.controller import (
-    ControllerSetup,
-    load_controller_interface,
-)
+from hexapod_cosim.cosim.interface.controller import ControllerSetup, load_controller_interface
 from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.cosim.scenario.records import GRAVITY_NAMES
 from hexapod_cosim.models import FmuError, HexapodError, unknown_name

@@ -68,12 +68,7 @@ class Connection:
 
 
 def export_ssp(
-    path: str | Path,
-    fmus: Mapping[str, Path],
-    *,
-    title: str,
-    step: float,
-    stop: float,
+    path: str | Path, fmus: Mapping[str, Path], *, title: str, step: float, stop: float
 ) -> Path:
     """Writes a package of FMUs, connected by the names of their variables, and returns its path.
 
@@ -226,7 +221,5 @@ def _add_experiment(root: Element, step: float, stop: float) -> None:
         SubElement(parent, "ssd:Annotations"), "ssc:Annotation", type="com.opensimulationplatform"
     )
     SubElement(
-        SubElement(annotation, "osp:Algorithm"),
-        "osp:FixedStepAlgorithm",
-        baseStepSize=repr(step),
+        SubElement(annotation, "osp:Algorithm"), "osp:FixedStepAlgorithm", baseStepSize=repr(step)
     )

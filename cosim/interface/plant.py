@@ -116,9 +116,7 @@ def read_table(component: Component) -> dict[str, Any]:
     for causality in CAUSALITIES:
         entries = table.get(causality, [])
         if any("record" in entry for entry in entries):
-            from hexapod_cosim.cosim.interface.gain_rows import (  # noqa: PLC0415  slow to import
-                rows_of_records,
-            )
+            from hexapod_cosim.cosim.interface.gain_rows import rows_of_records  # noqa: PLC0415  slow to import
 
             entries = rows_of_records(entries)
         table[causality] = [with_defaults(entry, causality, table["unit"]) for entry in entries]

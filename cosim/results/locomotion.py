@@ -43,6 +43,11 @@ FINDINGS = (  # flag of the controller, what its begin and its end mean
         for joint in JOINT_NAMES
     ),
     ("absent", "the controller walks without {leg}", "the controller walks with {leg} again"),
+    (
+        "outrun",
+        "the command is too fast for the joints of {leg}: the body walks slower",
+        "the command is no longer too fast for the joints of {leg}",
+    ),
 )
 SURELY = 2.0  # times the least walk: a shorter commanded way asks for no walk
 UPRIGHT = 0.6  # rad

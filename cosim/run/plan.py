@@ -14,11 +14,7 @@ from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
 from hexapod_cosim.cosim.scenario.schedule import Schedule, make_schedule
-from hexapod_cosim.cosim.scenario.variation import (
-    Drawn,
-    delayed,
-    draw,
-)
+from hexapod_cosim.cosim.scenario.variation import Drawn, delayed, draw
 from hexapod_cosim.models import Robot, unknown_name
 
 

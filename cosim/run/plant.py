@@ -18,9 +18,7 @@ from hexapod_cosim.cosim.results.ground import is_on_surface, surface_of_grid
 from hexapod_cosim.cosim.run.plan import RunPlan
 from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.variation import (
-    initial_values,
-)
+from hexapod_cosim.cosim.scenario.variation import initial_values
 from hexapod_cosim.models import LEG_NAMES, FmuError, Robot, load_robot
 from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.grid_file import grid_bytes

@@ -12,17 +12,11 @@ from pathlib import Path
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
-from hexapod_cosim.cosim.control.controllers import (
-    connection_of,
-    fmu_parameters_of,
-)
+from hexapod_cosim.cosim.control.controllers import connection_of, fmu_parameters_of
 from hexapod_cosim.cosim.control.fmu_instance import open_controller_fmu
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw
 from hexapod_cosim.cosim.export.plant import export_controller
-from hexapod_cosim.cosim.interface.controller import (
-    ControllerSetup,
-    controller_parameters,
-)
+from hexapod_cosim.cosim.interface.controller import ControllerSetup, controller_parameters
 from hexapod_cosim.cosim.master.connection import Connection
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_block import FmuBlock

@@ -13,11 +13,7 @@ from typing import Any
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.plant_files import package_version
-from hexapod_cosim.cosim.control.controllers import (
-    control_facts,
-    make_controller,
-    text_of_law,
-)
+from hexapod_cosim.cosim.control.controllers import control_facts, make_controller, text_of_law
 from hexapod_cosim.cosim.control.fmu_law import FmuLaw
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.loop import (

@@ -14,11 +14,7 @@ from hexapod_cosim.cosim.interface.names import JOINTS, LEGS, joint_names, vecto
 from hexapod_cosim.cosim.scenario.records import Command, Variation
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.ground.faces import ground
-from hexapod_cosim.models.kinematics import (
-    foot_positions,
-    quaternion_product,
-    rotation_matrix,
-)
+from hexapod_cosim.models.kinematics import foot_positions, quaternion_product, rotation_matrix
 
 Array = NDArray[np.float64]
 

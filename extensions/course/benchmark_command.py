@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,7 +11,14 @@ import typer
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.cli.failures import SUCCESS
-from hexapod_cosim.cosim.cli.options import ControlNames, GainsFile, Json, Settings, Workers
+from hexapod_cosim.cosim.cli.options import (
+    ControlNames,
+    GainsFile,
+    Json,
+    Settings,
+    Workers,
+    command_line,
+)
 from hexapod_cosim.cosim.cli.running import given_gains
 from hexapod_cosim.cosim.cli.terminal import (
     counting_bar,
@@ -85,8 +91,10 @@ def benchmark(
         split, names=cases or (), seeds=seeds, quick=quick, settings=settings or ()
     )
     check_control(course.cases[0].scenario, laws)
-    options = {"control": controls, "case": cases, "set": settings, "seeds": seeds, "gains": gains}
-    command = _command_line(options, split=split, quick=quick)
+    command = command_line(
+        BENCHMARK, split=split, quick=quick, control=controls, case=cases, set=settings,
+        seeds=seeds, gains=gains,
+    )  # fmt: skip
     with results_folder(output or Path("out") / BENCHMARK, own=FILES) as folder:
         table, content, files = _run_into(
             folder, course, laws, given_gains(gains), workers, command
@@ -151,12 +159,3 @@ def _show(table: Table) -> None:
     for title, (columns, rows) in reversed(texts.tables(table)):
         show_text(f"\n{title}")
         show_table(columns, rows)
-
-
-def _command_line(options: Mapping[str, Any], *, split: str, quick: bool) -> str:
-    """Returns the command that repeats the benchmark."""
-    words = ["hexapod", "benchmark", "--split", split, *(["--quick"] if quick else [])]
-    for name, value in options.items():
-        for item in value if isinstance(value, list) else [value]:
-            words += [] if item is None else [f"--{name}", str(item)]
-    return shlex.join(words)

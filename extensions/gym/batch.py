@@ -58,10 +58,7 @@ def grounds(settings: EnvSettings) -> tuple[Robot, ...]:
     own = load_robot(settings.robot)
     foot = replace(own.foot, pad_radius=settings.pad_radius or own.foot.pad_radius)
     solver = replace(
-        own.solver,
-        method=settings.solver,
-        tolerance=settings.tolerance,
-        step_max=settings.step_max,
+        own.solver, method=settings.solver, tolerance=settings.tolerance, step_max=settings.step_max
     )
     found = []
     for seed in range(1, settings.terrain_seeds + 1):
@@ -86,7 +83,7 @@ def start_height(robots: Sequence[Robot]) -> float:
 
 def export_plant(robots: Sequence[Robot], folder: Path) -> Path:
     """Exports the plant's FMU with all grounds. Raises HexapodError."""
-    return export_fmu(robots[0], folder / "plant.fmu", terrains=surfaces(robots))
+    return export_fmu(robots[0], folder / "plant.fmu", terrains=surfaces(robots), bare=True)
 
 
 class Batch(Closing):

@@ -213,10 +213,7 @@ TASKS: Mapping[str, tuple[str, EnvSettings]] = {  # by name: title and settings
     "Hexapod-v0": ("flat ground", FLAT),
     "HexapodRough-v0": ("rubble of up to 30 mm from 8 seeds, friction 0.5 to 0.9", ROUGH),
     "HexapodSoil-v0": ("dry sand, feet with pads", SOIL),
-    "HexapodPush-v0": (
-        "flat ground, pushes of up to 40 N every 2 s, friction 0.5 to 0.9",
-        PUSH,
-    ),
+    "HexapodPush-v0": ("flat ground, pushes of up to 40 N every 2 s, friction 0.5 to 0.9", PUSH),
 }
 
 

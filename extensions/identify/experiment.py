@@ -186,11 +186,7 @@ def _source(name: str, robot: Robot) -> str:
 
 
 def _start(
-    experiment: Experiment,
-    robot: Robot,
-    zero: Array,
-    values: Mapping[str, float],
-    offset: Array,
+    experiment: Experiment, robot: Robot, zero: Array, values: Mapping[str, float], offset: Array
 ) -> dict[str, float]:
     """Returns the initial state: that of the first row, without the zeros of the joints' angles
     and with the start values that are unknown.

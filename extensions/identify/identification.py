@@ -153,7 +153,7 @@ def identify(
     rows = chosen_unknowns(robot, logs, groups)
     # small matrices: threads of linear algebra would wait for each other
     with threadpool_limits(1), TemporaryFolder("identify") as folder:
-        path = export_fmu(robot, folder / "robot.fmu")
+        path = export_fmu(robot, folder / "robot.fmu", bare=True)
         with ExitStack() as open_plants:
             plants = [open_plants.enter_context(LogPlant(path, TOLERANCE)) for _ in range(workers)]
             progress("the columns of the log")

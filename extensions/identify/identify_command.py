@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,14 +9,8 @@ from typing import Annotated
 
 import typer
 
-from hexapod_cosim.cosim.cli.options import Json, RobotName, Workers
-from hexapod_cosim.cosim.cli.terminal import (
-    show_files,
-    show_json,
-    show_table,
-    show_text,
-    warn,
-)
+from hexapod_cosim.cosim.cli.options import Json, RobotName, Workers, command_line
+from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table, show_text, warn
 from hexapod_cosim.cosim.results.folder import results_folder
 from hexapod_cosim.extensions.identify.bench.log import GROUPINGS
 from hexapod_cosim.extensions.identify.log import HELD_OUT, read_log
@@ -44,8 +37,7 @@ Find = Annotated[
     ),
 ]
 HeldOut = Annotated[
-    float,
-    typer.Option("--held-out", metavar="SHARE", help="Part of each log that only judges."),
+    float, typer.Option("--held-out", metavar="SHARE", help="Part of each log that only judges.")
 ]
 Friction = Annotated[
     str | None,
@@ -104,7 +96,10 @@ def identify(
             progress=(lambda _text: None) if json else _show_step,
         )
         folder.begin()
-        command = _command_line(logs, robot, find or [], friction, held_out)
+        share = held_out if held_out != HELD_OUT else None
+        command = command_line(
+            "identify", *logs, robot=robot, find=find, friction=friction, held_out=share
+        )
         written = results.write_identified(found, robot, folder.path, command=command)
     for text in results.warnings(found):
         warn(text.removesuffix("."))
@@ -118,17 +113,6 @@ def identify(
     show_table(results.ERRORS, results.error_rows(found), right=(2, 3, 4, 5, 6))
     show_text(results.open_text(found))
     show_files(written)
-
-
-def _command_line(
-    logs: Sequence[Path], robot: str, find: Sequence[str], friction: str | None, held_out: float
-) -> str:
-    """Returns the command that repeats the identification."""
-    words = ["hexapod", "identify", *map(str, logs), "--robot", robot]
-    words += [word for name in find for word in ("--find", name)]
-    words += ["--friction", friction] if friction else []
-    words += ["--held-out", str(held_out)] if held_out != HELD_OUT else []
-    return shlex.join(words)
 
 
 def _identify_servo(
@@ -154,8 +138,7 @@ def _identify_servo(
             fix="hexapod identify servo logs/*.json",
             where="LOG",
         )
-    words = ["hexapod", "identify", SERVO_WORD, *map(str, logs), "--robot", robot]
-    words += ["--hold-out", by, *(["--friction", friction] if friction else [])]
+    options = {"robot": robot, "hold_out": by, "friction": friction}
     with results_folder(output or Path("out") / "identify") as folder:
         found = command.identified_servo(
             logs,
@@ -166,7 +149,8 @@ def _identify_servo(
             progress=(lambda _text: None) if json else _show_step,
         )
         folder.begin()
-        files = command.write_servo(found, folder.path, command=shlex.join(words), by=by)
+        written = command_line("identify", SERVO_WORD, *logs, **options)
+        files = command.write_servo(found, folder.path, command=written, by=by)
     if json:
         show_json({**command.result_table(found), "files": [str(path) for path in files]})
         return

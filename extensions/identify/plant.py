@@ -98,7 +98,11 @@ class LogPlant(Closing):
     def _run(
         self, time: Array, delays: Sequence[float], table: Array, inputs: Any, outputs: list[Any]
     ) -> list[Array]:
-        """Simulates rows of commands; returns the outputs of each block (rows, outputs)."""
+        """Simulates rows of commands; returns the outputs of each block (rows, outputs).
+
+        This is no macro-step: nothing controls, and readings lie between the commands by delays of
+        their own.
+        """
         found = [np.empty((len(time), len(one.values))) for one in outputs]
         step, rows = self.fmu.step, [(one.get, one.values) for one in outputs]
         now = float(time[0])

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import csv
 import io
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from hexapod_cosim.cosim.cli.options import FmuFile, Json, RobotName
+from hexapod_cosim.cosim.cli.options import FmuFile, Json, RobotName, command_line
 from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table, waiting, warn
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
@@ -76,11 +75,7 @@ class Replay:
 
 
 def replay(
-    log: Log,
-    robot: Robot,
-    *,
-    fmu: Path | None = None,
-    parameters: Mapping[str, Any] | None = None,
+    log: Log, robot: Robot, *, fmu: Path | None = None, parameters: Mapping[str, Any] | None = None
 ) -> Replay:
     """Simulates a robot from the log's first row on, with the log's commands.
 
@@ -94,7 +89,7 @@ def replay(
     """
     log = with_speed_references(log, robot)
     with TemporaryFolder("replay") as folder:
-        path = fmu or export_fmu(robot, folder / "robot.fmu")
+        path = fmu or export_fmu(robot, folder / "robot.fmu", bare=True)
         with LogPlant(path, parameters) as plant:
             names = plant.known(log.measured)
             if not names:
@@ -195,19 +190,17 @@ def replay_command(
 ) -> None:
     """Drive the plant FMU with a recorded log and compare all readings with it."""
     own = load_robot(robot)
-    words = ["hexapod", "replay", str(log), "--robot", robot]
     if is_bench_log(log):
-        _replay_bench(log, own, output, shlex.join(words), json)
+        _replay_bench(log, own, output, command_line("replay", log, robot=robot), json)
         return
     parameters = fmu_parameters(settings or [])
-    words += [word for text in settings or [] for word in ("--set", text)]
-    words += ["--fmu", str(fmu)] if fmu else []
+    command = command_line("replay", log, robot=robot, set=settings, fmu=fmu)
     recorded = read_log(log, robot=own)
     with results_folder(output or Path("out") / "replay", own=("replay.csv",)) as folder:
         with waiting("replaying the log"):
             done = replay(recorded, own, fmu=fmu, parameters=parameters)
         folder.begin()
-        files = write_replay(done, own, folder.path, command=shlex.join(words), settings=parameters)
+        files = write_replay(done, own, folder.path, command=command, settings=parameters)
     for text in done.warnings:
         warn(text.removesuffix("."))
     if json:

@@ -83,11 +83,7 @@ def live(
         _write_page(page, json=json)
         return
     from hexapod_cosim.extensions.live.server import LiveServer  # noqa: PLC0415  slow to import
-    from hexapod_cosim.extensions.live.settings import (  # noqa: PLC0415
-        Choices,
-        control_texts,
-        live_scenario,
-    )
+    from hexapod_cosim.extensions.live.settings import Choices, control_texts, live_scenario  # noqa: PLC0415
 
     plan = load_scenario(scenario, overrides=settings or [])
     given = parse_controls(control or [plan.control], where="--control")

@@ -61,10 +61,7 @@ def measure(
 
 
 def _measure(
-    robot: LiveRobot,
-    command: BodyCommand,
-    count: int,
-    progress: Callable[[float], None] | None,
+    robot: LiveRobot, command: BodyCommand, count: int, progress: Callable[[float], None] | None
 ) -> Times:
     """Steps a robot with a clock around its plant; collections of garbage wait."""
     times = np.zeros((2, count))

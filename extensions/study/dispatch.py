@@ -25,11 +25,7 @@ from hexapod_cosim.extensions.study.job import Job
 from hexapod_cosim.extensions.study.records import Order, RunResult, StudyError
 from hexapod_cosim.extensions.study.rules import require
 from hexapod_cosim.extensions.study.store import Store
-from hexapod_cosim.extensions.study.worker import (
-    close_runners,
-    run_orders,
-    summary_without_figures,
-)
+from hexapod_cosim.extensions.study.worker import close_runners, run_orders, summary_without_figures
 
 MAX_CHUNK = 16  # runs: half a second of work, so that a dead worker loses little
 CHUNKS_PER_WORKER = 2  # a worker that finishes a chunk has the next one already

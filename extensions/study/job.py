@@ -14,12 +14,7 @@ from uuid import uuid4
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT
-from hexapod_cosim.cosim.common.plant_files import (
-    binary,
-    code_hash,
-    fmi2_platform,
-    package_version,
-)
+from hexapod_cosim.cosim.common.plant_files import binary, code_hash, fmi2_platform, package_version
 from hexapod_cosim.cosim.control.controllers import check_control
 from hexapod_cosim.cosim.run.plan import chosen_gains, design_key
 from hexapod_cosim.cosim.run.runner import Runner

@@ -97,10 +97,7 @@ def _wrong_array(path: Path, got: str) -> RobotError:
     return _refused(path, NO_MAP, got, expected, "write it with numpy.save")
 
 
-READERS: dict[str, Callable[[Path], HeightFile]] = {
-    ".png": _read_png,
-    ".npy": _read_npy,
-}
+READERS: dict[str, Callable[[Path], HeightFile]] = {".png": _read_png, ".npy": _read_npy}
 
 
 MAPS: Entries = {}

@@ -27,7 +27,6 @@ MOVING = ("revolute", "continuous")
 KINDS = (*MOVING, "fixed", "floating")
 EFFECTIVE = ("link", "joint", EXTENSION, "material", "mujoco")  # others are listed as ignored
 AXIS_TOLERANCE = 1e-6  # an axis this close to unit length is not normalised
-DAMPING = "damping"  # a side file may ignore it
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +88,8 @@ class Urdf:
     ignored: Counter[str]  # elements without effect here
 
 
-def parse_urdf(text: str | bytes, *, where: str, ignore: tuple[str, ...] = ()) -> Urdf:
-    """Reads a URDF; `ignore` may contain "damping". Raises RobotError."""
+def parse_urdf(text: str | bytes, *, where: str) -> Urdf:
+    """Reads a URDF. Raises RobotError."""
     root = read_root(text, where)
     ignored = Counter(element.tag for element in root if element.tag not in EFFECTIVE)
     elements = {kind: _named(root, kind, where) for kind in ("link", "joint")}
@@ -99,7 +98,7 @@ def parse_urdf(text: str | bytes, *, where: str, ignore: tuple[str, ...] = ()) -
         for name, element in elements["link"].items()
     }
     joints = tuple(
-        _joint(element, f"{where}: joint {name!r}", ignore, ignored)
+        _joint(element, f"{where}: joint {name!r}", ignored)
         for name, element in elements["joint"].items()
     )
     return Urdf(root.get("name") or "robot", where, links, joints, root.find(EXTENSION), ignored)
@@ -150,9 +149,7 @@ def _inertial(link: ET.Element, where: str) -> Inertial | None:
     return Inertial(mass, p, R @ inertia @ R.T + 0.0) if mass > 0.0 else None
 
 
-def _joint(
-    element: ET.Element, where: str, ignore: tuple[str, ...], ignored: Counter[str]
-) -> UrdfJoint:
+def _joint(element: ET.Element, where: str, ignored: Counter[str]) -> UrdfJoint:
     kind = element.get("type", "")
     if kind not in KINDS:
         raise unknown_name("joint type", kind, KINDS, where=where, error=RobotError)
@@ -164,8 +161,6 @@ def _joint(
         raise RobotError(what, got=got, expected=expected, fix=fix, where=where)
     R, p, angles = origin(element, where)
     dynamics = element.find("dynamics")
-    damping = number(dynamics, DAMPING, 0.0, where)
-    ignored[DAMPING] += moves and DAMPING in ignore and damping != 0.0
     limit, (lower, upper) = element.find("limit"), _limits(element, kind, where, ignored)
     return UrdfJoint(
         name=element.get("name", ""),
@@ -181,7 +176,7 @@ def _joint(
         effort=_optional(limit, "effort", where),
         velocity=_optional(limit, "velocity", where),
         friction=number(dynamics, "friction", 0.0, where) if moves else 0.0,
-        damping=0.0 if DAMPING in ignore or not moves else damping,
+        damping=number(dynamics, "damping", 0.0, where) if moves else 0.0,
     )
 
 

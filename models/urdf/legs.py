@@ -9,7 +9,6 @@ controller requires, where their axes allow it. Joints with the opposite axis ar
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,18 +41,11 @@ class FoundLeg:
 
 
 def find_legs(
-    torso: Body,
-    origin: Array,
-    axes: Array,
-    *,
-    keep_frames: bool,
-    signs: Mapping[str, list[float]],
-    where: str,
+    torso: Body, origin: Array, axes: Array, *, keep_frames: bool, where: str
 ) -> list[FoundLeg]:
     """Returns the six legs in the order LF LM LR RF RM RR. Raises RobotError.
 
-    origin (3,) and axes (3, 3): the torso's frame in the root link's. signs: of the angles of a
-    leg's joints in the URDF over ours where the frames are kept; by default 1.
+    origin (3,) and axes (3, 3): the torso's frame in the root link's.
     """
     if len(torso.branches) != len(LEG_NAMES):
         raise _not_six(torso, where)
@@ -62,15 +54,7 @@ def find_legs(
     order = _order(hips, [chain[0].joint.name for chain in chains], where)
     middle = hips.mean(axis=0)
     return [
-        _leg(
-            name,
-            chains[k],
-            hips[k],
-            hips[k] - middle,
-            axes,
-            kept=signs.get(name, [1.0, 1.0, 1.0]) if keep_frames else None,
-            where=where,
-        )
+        _leg(name, chains[k], hips[k], hips[k] - middle, axes, keep_frames=keep_frames, where=where)
         for name, k in zip(LEG_NAMES, order, strict=True)
     ]
 
@@ -130,14 +114,13 @@ def _leg(
     outwards: Array,
     axes: Array,
     *,
-    kept: list[float] | None,
+    keep_frames: bool,
     where: str,
 ) -> FoundLeg:
-    """Returns a leg. kept: signs of its joints where the frames are kept."""
     turns = [axes.T @ chain[0].rotation]  # links' axes to the torso's at angle 0
     for branch in chain[1:]:
         turns.append(turns[-1] @ branch.rotation)
-    wanted = None if kept else _pattern_yaw(turns, chain, outwards)
+    wanted = None if keep_frames else _pattern_yaw(turns, chain, outwards)
     yaw, R_HC = _yaw(chain[0], turns[0], wanted, plain=bool((axes == np.eye(3)).all()))
     turns = [R_HC, R_HC @ chain[1].rotation, R_HC @ chain[1].rotation @ chain[2].rotation]
     foot, radius = foot_of(chain[2].body)
@@ -148,10 +131,10 @@ def _leg(
     ]
     table: dict[str, Any] = {"hip_position": hip.tolist(), "hip_yaw": yaw}
     other_way = []
-    for joint, pattern, own, branch, R, tip in zip(
-        JOINT_NAMES, PATTERN, kept or [1.0, 1.0, 1.0], chain, turns, tips, strict=True
+    for joint, pattern, branch, R, tip in zip(
+        JOINT_NAMES, PATTERN, chain, turns, tips, strict=True
     ):
-        axis, sign = _axis(R @ branch.joint.axis, None if wanted is None else pattern, own)
+        axis, sign = _axis(R @ branch.joint.axis, pattern if wanted is not None else None)
         other_way += [branch.joint.name] if sign < 0.0 else []
         table[joint] = _link(branch, R, tip, axis, sign, where)
     names = tuple(branch.joint.name for branch in chain)
@@ -190,10 +173,9 @@ def _yaw(coxa: Branch, R_TC: Array, wanted: float | None, *, plain: bool) -> tup
     return yaw, axis_rotation(Z, -yaw) @ R_TC
 
 
-def _axis(axis: Array, pattern: Array | None, own: float) -> tuple[Array, float]:
-    """Returns a joint's axis and the sign of its angle in the URDF: `own` without a pattern."""
+def _axis(axis: Array, pattern: Array | None) -> tuple[Array, float]:
     if pattern is None:
-        return math.copysign(1.0, own) * axis + 0.0, own
+        return axis + 0.0, 1.0
     return pattern, 1.0 if axis @ pattern > 0.0 else -1.0
 
 

@@ -7,9 +7,9 @@ or from defaults.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +59,7 @@ from hexapod_cosim.models.urdf.assumed import (
     equivalent_box,
 )
 from hexapod_cosim.models.urdf.bodies import Body, root_body
-from hexapod_cosim.models.urdf.elements import DAMPING, Urdf, extension_tables, parse_urdf
+from hexapod_cosim.models.urdf.elements import Urdf, extension_tables, parse_urdf
 from hexapod_cosim.models.urdf.legs import FoundLeg, find_legs, inertia_entries
 
 Table = dict[str, Any]
@@ -102,20 +102,17 @@ class Options:
     """The [urdf] table of a side file."""
 
     forward: str = "x"
-    ignore: tuple[str, ...] = ()
     keep_frames: bool = False
 
     @classmethod
     def read(cls, table: Mapping[str, Any], where: str) -> Options:
         """Returns the options of a table. Raises RobotError for keys and values not allowed."""
-        refuse_unknown_keys(table, ["file", "forward", "ignore", "keep_frames"], where)
+        refuse_unknown_keys(table, ["file", "forward", "keep_frames"], where)
         forward = Choice(tuple(FORWARD)).read(table.get("forward", "x"), f"{where}.forward")
-        ignore, keep = table.get("ignore", []), table.get("keep_frames", False)
-        if not isinstance(ignore, list) or any(name != DAMPING for name in ignore):
-            raise wrong_type(ignore, f'["{DAMPING}"]', "correct it", f"{where}.ignore")
+        keep = table.get("keep_frames", False)
         if not isinstance(keep, bool):
             raise wrong_type(keep, "true or false", "correct it", f"{where}.keep_frames")
-        return cls(forward, tuple(ignore), keep)
+        return cls(forward, keep)
 
 
 def side_table(side: Mapping[str, Any], folder: Path, where: str) -> Table:
@@ -144,26 +141,23 @@ def urdf_table(
     where: name of the side file for messages.
     """
     options, side = options or Options(), {} if side is None else side
-    urdf = parse_urdf(_read(path), where=str(path), ignore=options.ignore)
+    urdf = parse_urdf(_read(path), where=str(path))
     own = extension_tables(urdf, EXTENSION_FIELDS, EXTENSION_ENTRIES)
     own = _terrain_beside(own, path.parent)
     keep = options.keep_frames or (
         urdf.extension is not None and urdf.extension.get("frames") == "ours"
     )
     root = root_body(urdf)
-    signs = {name: own[name]["signs"] for name in LEG_NAMES if "signs" in own.get(name, {})}
-    torso, legs = _found(root, urdf, options.forward, keep_frames=keep, signs=signs)
+    torso, legs = _found(root, urdf, options.forward, keep_frames=keep)
+    legs = [_turned(leg, own.get(leg.name, {}).get("signs", (1.0, 1.0, 1.0))) for leg in legs]
     above = merged_tables(_shaped(own), _spread(side, where or str(path)))
     table = merged_tables(merged_tables(_assumed(), _measured(urdf, torso, legs)), above)
     _refuse_footless(legs, table, urdf.where)
     assumed = [name for name in WHOLE if name not in own and name not in side]
     assumed += _complete(table, legs, urdf)
     bare = "body" not in own and "body" not in side
-    table["source"] = (
-        _source(urdf, legs, assumed, bare=bare)
-        | _damped(table["servo"], legs, f"{where or path}: servo.kd")
-        | dict(side.get("source", {}))
-    )
+    source = _source(urdf, legs, assumed, bare=bare) | _damped(table, legs, assumed)
+    table["source"] = source | dict(side.get("source", {}))
     return table
 
 
@@ -184,8 +178,19 @@ def _assumed() -> Table:
     return tomllib.loads((Path(__file__).parent / "assumed.toml").read_text(encoding="utf-8"))
 
 
+def _turned(leg: FoundLeg, signs: Sequence[float]) -> FoundLeg:
+    """Returns a leg with the joints of negative sign counted against the URDF's axes."""
+    other_way = [k for k, sign in enumerate(signs) if sign < 0.0]
+    table = dict(leg.table)
+    for joint in (JOINT_NAMES[k] for k in other_way):
+        link = table[joint]
+        limits = {"angle_min": -link["angle_max"], "angle_max": -link["angle_min"]}
+        table[joint] = link | {"axis": [0.0 - value for value in link["axis"]]} | limits
+    return replace(leg, table=table, reversed=(*leg.reversed, *(leg.joints[k] for k in other_way)))
+
+
 def _found(
-    root: Body, urdf: Urdf, forward: str, *, keep_frames: bool, signs: Mapping[str, list[float]]
+    root: Body, urdf: Urdf, forward: str, *, keep_frames: bool
 ) -> tuple[Table, list[FoundLeg]]:
     """Returns the table of the torso, and the legs.
 
@@ -204,9 +209,7 @@ def _found(
         "inertia": inertia_entries(axes.T @ inertial.inertia @ axes + 0.0),
     }
     torso["size"] = _box(root, axes, torso) or equivalent_box(torso["mass"], torso["inertia"])
-    return torso, find_legs(
-        root, origin, axes, keep_frames=keep_frames, signs=signs, where=urdf.where
-    )
+    return torso, find_legs(root, origin, axes, keep_frames=keep_frames, where=urdf.where)
 
 
 def _refuse_footless(legs: list[FoundLeg], table: Table, where: str) -> None:
@@ -320,13 +323,15 @@ def _complete(table: Table, legs: list[FoundLeg], urdf: Urdf) -> list[str]:
     return assumed + [f"gait.{key}" for key in assume_gait(table["gait"], _height(table))]
 
 
-def _damped(servo: Table, legs: list[FoundLeg], where: str) -> Table:
-    """Adds the mean damping of the joints to kd, in place; returns the note about it."""
+def _damped(table: Table, legs: list[FoundLeg], assumed: list[str]) -> Table:
+    """Adds the mean damping of the joints to an assumed kd, in place; returns the note about it."""
     damping = float(np.mean([branch.joint.damping for leg in legs for branch in leg.servo]))
-    if damping == 0.0 or "kd" not in servo:
+    if damping == 0.0:
         return {}
-    servo["kd"] = Number("N m s/rad").read(servo["kd"], where) + damping
-    return {"URDF, damping": f"of the joints, added to servo.kd: {damping:.6g} N m s/rad"}
+    if "servo.kd" in assumed:
+        table["servo"]["kd"] += damping
+    done = "added to" if "servo.kd" in assumed else "without effect beside the given"
+    return {"URDF, damping": f"{damping:.6g} N m s/rad of the joints, {done} servo.kd"}
 
 
 def _unify(table: Table, legs: list[FoundLeg], urdf: Urdf) -> None:

@@ -14,7 +14,7 @@ from standing import ROBOT, WEIGHT, Laws, make_laws, plan, squeezing
 from hexapod_cosim.controller import Parts
 from hexapod_cosim.controller.sense.contact_detection import ContactDetector
 from hexapod_cosim.controller.sense.touchdown import Landings, Touchdown
-from hexapod_cosim.controller.sense.trust import SensorWatch
+from hexapod_cosim.controller.sense.trust import SensorWatch, replaced
 
 LOAD, CYCLE, SAMPLE = 50.0, 1.0, 0.005  # N, s, s
 NO_LEGS, ALL_LEGS = np.zeros(6, dtype=bool), np.ones(6, dtype=bool)
@@ -57,6 +57,26 @@ def test_a_stuck_sensor_of_a_foot_in_mid_swing_is_doubted_after_60_milliseconds(
     watch = SensorWatch(LOAD, cycle=CYCLE, period=SAMPLE)
     count = until_doubted(watch, 2, touching=ALL_LEGS, total=LOAD, standing=but(2), high=only(2))
     assert count in {12, 13}
+
+
+def test_a_doubted_foot_touches_down_above_10_percent_and_lifts_off_below_3_percent() -> None:
+    watch, touching, found = SensorWatch(LOAD, cycle=CYCLE, period=SAMPLE), NO_LEGS, []
+    for force in (0.0, 4.9, 5.1, 1.6, 1.4, 4.9):  # N
+        touching = watch.found(np.full(6, force), touching)
+        found.append(bool(touching[2]))
+    assert found == [False, False, True, True, False, False]
+
+
+def test_doubted_feet_bear_what_the_others_leave_in_the_shares_of_the_plan() -> None:
+    planned = np.array([[1.0, 2.0, load] for load in (10.0, 30.0, 10.0, 0.0, 0.0, 0.0)])
+    force = np.array([[0.5, 0.0, load] for load in (12.0, 99.0, 6.0, 7.0, 0.0, 5.0)])
+    one = replaced(force, planned, but(5), only(1))  # foot 5 reports no contact
+    assert one[1].tolist() == pytest.approx([1.0, 2.0, 25.0])
+    assert one[[0, 2, 3, 4, 5]].tolist() == force[[0, 2, 3, 4, 5]].tolist()
+    assert replaced(force, planned, ALL_LEGS, only(1, 2))[:, 2] == pytest.approx(
+        [12.0, 19.5, 6.5, 7.0, 0.0, 5.0]
+    )
+    assert replaced(force, planned, ALL_LEGS, only(3, 4))[3, 2] == 0.0  # the others bear more
 
 
 def test_a_missing_foothold_whose_weight_the_others_carry_is_not_a_dead_sensor() -> None:
@@ -158,7 +178,7 @@ def test_an_awaited_foot_searches_at_a_speed_that_grows_and_stops_within_a_perio
 
 @pytest.mark.parametrize("height", [0.012, -0.012])
 @pytest.mark.parametrize("swings", [True, False])
-def test_a_foot_whose_sensor_is_doubted_returns_to_its_path_in_its_stance_too(
+def test_a_foot_whose_sensor_has_just_been_doubted_returns_to_its_path_in_its_stance_too(
     height: float, swings: bool
 ) -> None:
     down = Touchdown(period=STEP)

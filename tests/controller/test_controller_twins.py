@@ -22,7 +22,7 @@ CONSTANT = re.compile(r"(\w+) = (-?[\d.e+-]+)(?=[,;])")
 CITATION = re.compile(r"\bC(\d+)(?: to C(\d+))?\b")
 # Python takes these from math.tau and from the plant's GEAR_SPEED
 C_ONLY_CONSTANTS = {"whole_turn", "gear_speed"}
-EQUATIONS = set(range(1, 59))
+EQUATIONS = set(range(1, 60))
 
 
 def test_every_part_has_its_twin() -> None:

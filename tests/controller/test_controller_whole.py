@@ -273,6 +273,15 @@ def test_a_leg_that_cannot_follow_is_flagged_and_stays_within_its_limits() -> No
     assert (angle <= robot.angle_max).all()
 
 
+def test_feet_that_give_up_an_offset_at_once_keep_to_the_speed_of_the_joints() -> None:
+    controller = make(compliant=True)
+    run(controller, BodyCommand(vx=0.05), 150)
+    assert controller.compliant is not None
+    controller.compliant.offset, controller.compliant.moving = np.full(6, 0.03), True
+    out = controller.step(150 * PERIOD, BodyCommand(vx=0.05), Measurement())
+    assert np.abs(out.speed_ref).max() == controller.robot.servo.speed_max
+
+
 @pytest.mark.parametrize("t", [PERIOD, 2.5 * PERIOD, float("nan")])
 def test_a_step_out_of_time_is_refused(t: float) -> None:
     controller = make()

@@ -41,14 +41,14 @@ class Weighed(LoadAdaptation):
 
 
 def walk(name: str, *, sway: bool, heft: float = HEAVY, narrowing: float = 1.0) -> Controller:
-    """Returns a controller of an amble whose feet feel nothing."""
+    """Returns a controller of an amble whose feet feel nothing, without slow loops."""
     robot = load_robot(name)
     controller = Controller(
         robot,
         period=PERIOD,
         gait=make_gait(robot, "amble"),
         gains=make_gains(robot),
-        parts=Parts(sway=sway),
+        parts=Parts(sway=sway, posture=False, path=False),
     )
     assert controller.compliant is not None
     controller.compliant.adaptation = Weighed(heft, narrowing)

@@ -189,6 +189,7 @@ SAYS = {
     "07_casadi.py": [
         "gradient    -3.72",
         "differences -3.72",
+        "cost 0.001857, simulated 0.001857",
         # a package of 280 MB, which `make test-importers` installs
         FOUND if find_spec("casadi") else "without casadi nothing is tuned",
     ],

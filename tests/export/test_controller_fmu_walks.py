@@ -114,7 +114,7 @@ FAULTS = 'events=[{time=1.5, leg="LM", fault="dead"}, {time=2.5, leg="RF", fault
                 "sensors.foot_force_noise=0.05",
                 "sensors.foot_force_delay=0.01",
             ],
-            True,
+            False,
         ),
     ],
 )

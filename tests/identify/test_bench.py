@@ -4,6 +4,7 @@ fit that finds the servo which made the logs.
 
 from __future__ import annotations
 
+import csv
 import ctypes as ct
 import json
 from dataclasses import replace
@@ -205,3 +206,16 @@ def test_a_replayed_bench_log_is_drawn_beside_its_simulation(call: Call, tmp_pat
     call("replay", tmp_path / "x.json", "-o", tmp_path / "out")
     assert "data:image/svg+xml" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert_refused(call("identify", "servo", "-o", tmp_path / "none"), "no bench logs", "JSON")
+
+
+ROOT = Path(__file__).parents[2]
+ON_PAGE = ("servo", "judged_on", "logs", "angle_deg", "speed_rad_s", "torque", "bam_angle_deg")
+
+
+def test_the_page_has_the_rows_that_the_benchmark_wrote() -> None:
+    with (ROOT / "benchmarks" / "results" / "servos.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    written = ["| " + " | ".join(row[key] for key in ON_PAGE) + " |" for row in rows]
+    page = (ROOT / "docs" / "reality.md").read_text(encoding="utf-8").splitlines()
+    assert [line for line in page if line.startswith("| ")][1:] == written
+    assert len(written) > 20

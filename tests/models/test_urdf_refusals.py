@@ -172,7 +172,7 @@ SIDES: dict[str, tuple[str, str, list[str]]] = {
     "cannot be ignored": (
         "[links]",
         'ignore = ["mimic"]\n[links]',
-        ["urdf.ignore", "mimic", "damping"],
+        ["unknown key", "ignore", "keep_frames"],
     ),
     "section of wrong type": ("[urdf]", "servo = 3\n[urdf]", ["servo", "a table"]),
     "value of wrong type": ("[links]", '[servo]\nkp = "stiff"\n[links]', ["servo.kp", "'stiff'"]),

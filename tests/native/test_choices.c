@@ -349,7 +349,7 @@ static void contradictions_are_refused_by_name(void) {
     void (*make)(hxDefinition *d);
     const char *name;
   } wrong[] = {{heavy_side, "torso.inertia_xx"},
-               {skew_inertia, "LR.femur.inertia_xx"},
+               {skew_inertia, "LR.femur.inertia_yy"},
                {no_axis, "LM.coxa.axis"},
                {no_way, "LF.tibia.angle_min"},
                {no_length, "RF.femur.length"},

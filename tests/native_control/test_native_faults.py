@@ -75,18 +75,21 @@ def heavy(force: np.ndarray, step: int) -> None:
 def test_sensors_that_lie_ground_that_is_missing_and_slides_are_answered_at_the_same_step(
     controller_core: ct.CDLL, name: str, spoil: Callable[[np.ndarray, int], None]
 ) -> None:
-    ground = Ground()
+    ground, doubted = Ground(), np.zeros(6, dtype=np.bool_)
 
     def sense(controller: Controller, step: int, measurement: Measurement) -> None:
         ground(controller, step, measurement)
         spoil(measurement.foot_force, step)
         follow_forces(controller, measurement)
+        assert controller.compliant is not None
+        doubted[...] |= controller.compliant.laws.doubted
 
     # with a planned squeeze even four times the weight does not ask too much of the second robot
     setup = setup_of(name, parts=Parts(squeeze=0.0))
     worst, fallback = differences(controller_core, setup, sense=sense)
     assert close(worst)
-    assert fallback.any() or spoil is uneven
+    assert fallback.any() == (spoil not in (uneven, dead_and_stuck))
+    assert doubted.any() or spoil is not dead_and_stuck
 
 
 @pytest.mark.parametrize(
@@ -152,14 +155,11 @@ def test_feet_that_find_no_ground_are_awaited_at_the_same_step(
     assert 0.02 < np.mean(sense.waiting) < 0.8
 
 
-@pytest.mark.parametrize(("speed_max", "least", "most"), [(3.0, 0.09, 0.12), (2.6, 0.0, 0.02)])
-def test_feet_of_joints_that_are_too_slow_are_hardly_awaited(
-    controller_core: ct.CDLL, speed_max: float, least: float, most: float
+@pytest.mark.parametrize("speed_max", [3.0, 2.6])
+def test_feet_of_joints_that_are_too_slow_are_awaited_as_others_are(
+    controller_core: ct.CDLL, speed_max: float
 ) -> None:
-    """At 2.6 rad/s the plan needs more speed for more than a fifth of the time, at 3 rad/s for
-    less. The first waits are earlier than the share of the time is known: a longer walk makes
-    them count less.
-    """
+    """Steps on the spot need 2.9 rad/s. The sensor of foot 3 is doubted."""
     sense, setup = LowGround(), setup_of()
     slow = replace(setup.robot, servo=replace(setup.robot.servo, speed_max=speed_max))
     robot = replace(setup, robot=slow, gains=make_gains(slow))
@@ -167,10 +167,12 @@ def test_feet_of_joints_that_are_too_slow_are_hardly_awaited(
         controller_core, robot, sense=sense, told=lambda t: program(0.7 * t), steps=2000
     )
     assert close(worst)
-    assert least <= np.mean(sense.waiting) < most
+    assert 0.19 < np.mean(sense.waiting) < 0.21
 
 
-def test_joints_that_are_outrun_fall_back_at_the_same_step(controller_core: ct.CDLL) -> None:
+def test_joints_that_are_outrun_hand_nothing_over_to_kinematic_control(
+    controller_core: ct.CDLL,
+) -> None:
     setup = setup_of()
     slow = replace(setup.robot, servo=replace(setup.robot.servo, speed_max=1.2))
     worst, fallback = differences(
@@ -180,5 +182,4 @@ def test_joints_that_are_outrun_fall_back_at_the_same_step(controller_core: ct.C
         steps=2100,
     )
     assert close(worst)
-    assert fallback.all(axis=1).any()
-    assert not fallback[-1].any()
+    assert not fallback.any()

@@ -96,6 +96,29 @@ def test_a_walk_that_loses_two_legs_and_takes_them_back_is_the_same(
     assert {none, alone, both} <= absent
 
 
+@pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
+def test_a_walk_that_outruns_its_joints_is_the_same(controller_core: ct.CDLL, name: str) -> None:
+    """The gait changes while the command is too fast, and the posture is not level."""
+    shown: set[bool] = set()
+    ground = Ground()
+
+    def told(t: float) -> BodyCommand:
+        if t < 3.0:
+            return BodyCommand(0.5, 0.2, 0.4, -0.01, 0.03, 0.02)
+        return BodyCommand(vx=0.01) if t < 4.5 else BodyCommand(yaw_rate=-2.5)
+
+    def sense(controller: Controller, step: int, measurement: Measurement) -> None:
+        shown.add(bool(controller.diagnostics.outrun.any()))
+        ground(controller, step, measurement)
+
+    changes = {200: make_gait(load_robot(name), "wave")}
+    worst, _ = differences(
+        controller_core, setup_of(name), sense=sense, told=told, changes=changes, steps=1200
+    )
+    assert close(worst)
+    assert shown == {False, True}
+
+
 PAPER_PARTS = ("paper_share", "paper_pid", "paper_suspension")
 
 

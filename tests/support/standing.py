@@ -61,7 +61,6 @@ def plan(
     standing: str = ALL,
     height: float = RAISED,
     rise: float = 0.0,
-    overspeed: bool = False,
 ) -> None:
     """Plans a step in which these legs stand and the others are in the air, at a height [m] and a
     vertical speed [m/s].
@@ -80,7 +79,6 @@ def plan(
         rise=rise * air,
         swinging=~stands,
         awaited=np.zeros(6, dtype=np.bool_),
-        overspeed=overspeed,
         period=PERIOD,
     )
 

@@ -8,7 +8,9 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 from tempfile import TemporaryDirectory
 
 import nbformat
@@ -22,19 +24,15 @@ from tools.docs.stage import DOCS, ROOT, add_page, pages, write
 
 PYTHON = """# Python
 
-All public modules, from their docstrings. Start with the [tutorial](../tutorial.md) and the
-[notebooks](../notebooks/index.md).
+All public modules, from their docstrings, a page for each folder. Start with the
+[tutorial](../tutorial.md) and the [notebooks](../notebooks/index.md).
 
-```{eval-rst}
-.. autosummary::
-   :toctree: python
-   :recursive:
-
-   hexapod_cosim.models
-   hexapod_cosim.controller
-   hexapod_cosim.cosim
+```{toctree}
+:glob:
+python/*
 ```
 """
+AUTOMODULE = "```{{eval-rst}}\n.. automodule:: {}\n   {}\n```"
 HEADERS = (
     "plant_fmu/include/hexapod/generated/plant_settings.h",
     "plant_fmu/include/hexapod/hexapod.h",
@@ -99,7 +97,22 @@ def generated(work: Path) -> Iterator[tuple[str, str]]:
         yield f"reference/{name}.md", variables.page(interface)
     yield "reference/commands.md", commands()
     yield "reference/python.md", PYTHON
+    for part in ("models", "controller", "cosim"):
+        yield from folder_pages(f"hexapod_cosim.{part}")
     yield "reference/c.md", c_headers(work / "reference")
+
+
+def folder_pages(folder: str) -> Iterator[tuple[str, str]]:
+    """Yields the page of a package with all its modules, and those of the packages within it."""
+    package = import_module(folder)
+    found = list(iter_modules(package.__path__, f"{folder}."))
+    modules = [one.name for one in found if not one.ispkg and one.name.rpartition(".")[2][0] != "_"]
+    lines = [f"# {folder}", AUTOMODULE.format(folder, "" if modules else ":members:")]
+    lines += [f"## {name}\n\n{AUTOMODULE.format(name, ':members:')}" for name in modules]
+    yield f"reference/python/{folder}.md", "\n\n".join(lines) + "\n"
+    for one in found:
+        if one.ispkg and one.name != "hexapod_cosim.cosim.cli":
+            yield from folder_pages(one.name)
 
 
 def commands() -> str:

@@ -119,6 +119,11 @@ static void watch(const hxControllerModel *model, const hxControllerInput *input
   memset(&level, 0, sizeof level);
   level.level = 1;
   hx_sense(input, &level, force);
+  /* a foot that its leg lifts bears no load: a stuck sensor must not make the servos strange */
+  const hxPlannedStep *now = hx_walk_plan_step(&state->plan, 0);
+  for (int k = 0; k < HX_LEGS; ++k)
+    if (state->plan.paths.clock.swinging[k] && now->feet.rise[k] > 0.0)
+      memset(force[k], 0, sizeof force[k]);
   hx_health_step(&model->health, model->plan.planner.leg, input->angle, (const double (*)[3])force,
                  &state->output, &state->health);
   if (!hx_walk_plan_lose(&model->plan, &state->health, &state->output, &state->plan)) return;
@@ -132,6 +137,7 @@ static void fold(const hxControllerModel *model, const hxControllerInput *input,
   const int back = hx_absence_fold(&model->plan.absent, model->plan.planner.leg, input->angle,
                                    &state->health, &state->plan.absence, &state->output);
   memcpy(state->output.absent, state->plan.absence.legs, sizeof state->output.absent);
+  memcpy(state->output.outrun, state->plan.pace.outrun, sizeof state->output.outrun);
   memcpy(state->output.faulty, state->health.faulty, sizeof state->output.faulty);
   if (back < 0 || state->back) return;
   state->back = back + 1;
@@ -156,7 +162,7 @@ void hx_controller_tick(const hxControllerModel *model, const hxControllerInput 
   const double command[HX_COMMANDS] = {input->command.vx,       input->command.vy,
                                        input->command.yaw_rate, input->command.height,
                                        input->command.roll,     input->command.pitch};
-  const int command_changed = hx_command_ramp_aim(&model->plan.ramp, command, &state->plan.ramp);
+  const int command_changed = hx_walk_plan_aim(&model->plan, command, &state->plan);
   hxPresentStep present;
   /* the first tick commands the stance, whatever the input */
   if (state->tick > 0 && model->feels) watch(model, input, state);

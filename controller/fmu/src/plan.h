@@ -4,17 +4,20 @@
 #define HX_PLAN_H
 
 #include "planned_step.h"
+#include "walk/pace.h"
 
 typedef struct hxWalkPlanModel {
   double period; /* s */
   hxStepPlanner planner;
   hxCommandRampModel ramp;
+  hxPaceModel pace;
   hxFootPathsModel paths;
   hxAbsenceModel absent;
 } hxWalkPlanModel;
 
 typedef struct hxWalkPlan {
-  hxCommandRamp ramp;
+  hxPace pace;
+  hxCommandRamp ramp; /* of the share of the command that the joints can follow */
   hxFootPaths paths;
   hxAbsence absence;
   int64_t at;   /* the present step, counted from the begin of its section */
@@ -31,6 +34,7 @@ static inline void hx_walk_plan_compile(const hxControllerDefinition *definition
   hx_step_planner_compile(definition, &model->planner);
   hx_command_ramp_compile(definition->gait.period, definition->period, &model->ramp);
   hx_foot_paths_compile(definition, model->planner.leg, &model->paths);
+  hx_pace_compile(&model->paths, &model->pace);
   if (model->planner.compliant) model->paths.clock.handover = model->planner.laws.support.handover;
   hx_absence_compile(model->paths.home, model->paths.clock.handover * definition->gait.period,
                      model->period, &model->absent);
@@ -39,6 +43,29 @@ static inline void hx_walk_plan_compile(const hxControllerDefinition *definition
 /* Index of a planned step: -1 is the previous one, 0 the present one, 1 the next one. */
 static inline hxPlannedStep *hx_walk_plan_step(hxWalkPlan *plan, int neighbour) {
   return &plan->step[(plan->present + neighbour + 3) % 3];
+}
+
+/* -------------------------------------------------------------------------------- the command */
+
+/* Aims at the share of a command that the joints can follow in the gait (C59). Returns whether the
+ * plan no longer applies. */
+HX_SELDOM static int set_pace(const hxWalkPlanModel *model, const double command[HX_COMMANDS],
+                              hxWalkPlan *plan) {
+  hxStride stride = {.leg = model->planner.leg,
+                     .model = &model->paths,
+                     .paths = &plan->paths,
+                     .absence = &plan->absence};
+  double target[HX_COMMANDS];
+  hx_pace_follow(&model->pace, &stride, command, &plan->pace, target);
+  return hx_command_ramp_aim(&model->ramp, target, &plan->ramp);
+}
+
+/* Leads the body to a command, as far as the joints can follow it. Returns as set_pace(). */
+static inline int hx_walk_plan_aim(const hxWalkPlanModel *model, const double command[HX_COMMANDS],
+                                   hxWalkPlan *plan) {
+  int same = 1;
+  for (int i = 0; i < HX_COMMANDS; ++i) same &= command[i] == plan->pace.asked[i];
+  return !same && set_pace(model, command, plan);
 }
 
 /* ------------------------------------------------------------------------------------- a step */
@@ -203,6 +230,7 @@ static HX_SELDOM void hx_walk_plan_adopt(hxWalkPlanModel *model, const hxWalkPla
   plan->at = 0;
   plan->last = INT64_MAX;
   plan->cut = 1;
+  set_pace(model, plan->pace.asked, plan);
 }
 
 /* Goes on in the phase of the plan under another control, in the same gait. before: the paths'
@@ -302,15 +330,12 @@ static inline void hx_walk_plan_present_step(const hxWalkPlanModel *model, const
   hx_inverse_dynamics_demand(&planner->laws.dynamics, planner->leg, &motion,
                              (const double (*)[HX_JOINTS])speed, &now->posture,
                              hx_step_planner_laden(planner, laws), &demand);
-  load->overspeed = 0;
   for (int k = 0; k < HX_LEGS; ++k) {
     load->feet[k] = hx_plane_add(now->plane[k], now->shift[k]);
     height[k] = hx_walk_plan_lift(model, plan, k);
     load->shares.activation[k] = now->activation[k];
     load->swinging[k] = plan->paths.clock.swinging[k];
     load->awaited[k] = plan->paths.clock.awaited[k];
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
-      load->overspeed |= fabs(speed[k][joint]) >= planner->leg[k].speed_max;
     hx_leg_solver_speeds(&planner->leg[k], &now->pose[k], hx_plane(0.0, 0.0), 1.0,
                          present->climb[k]);
   }

@@ -12,13 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.controller import (
-    BodyCommand,
-    Diagnostics,
-    JointCommand,
-    LegSolver,
-    Measurement,
-)
+from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, LegSolver, Measurement
 from hexapod_cosim.models import Robot
 
 DUTY = 0.6  # 1    part of its cycle for which a leg stands

@@ -73,7 +73,7 @@ def choose(
         progress(f"{len(models)} models, judged without one {by}")
         seen, unseen = parts[len(parts) // 2]
         found = list(
-            pool.map(_fitted_and_judged, repeat(seen), repeat(unseen), repeat(robot), models)
+            pool.map(fitted_and_judged, repeat(seen), repeat(unseen), repeat(robot), models)
         )
         fits = {model: Errors.mean(own) for model, own in zip(models, found, strict=True)}
     model = next(
@@ -83,9 +83,7 @@ def choose(
     )
     progress(f"{model}, all logs and {len(parts)} times without one {by}")
     seen_parts, unseen_parts = zip(*parts, strict=True)
-    judgements = pool.map(
-        _fitted_and_judged, seen_parts, unseen_parts, repeat(robot), repeat(model)
-    )
+    judgements = pool.map(fitted_and_judged, seen_parts, unseen_parts, repeat(robot), repeat(model))
     whole = fit_servo(logs, robot, model)  # here, while the pool judges
     pairs = [
         pair for own, one in zip(unseen_parts, judgements, strict=True)
@@ -94,7 +92,8 @@ def choose(
     return Choice(model=model, fit=whole, held_out=tuple(pairs), models=fits)
 
 
-def _fitted_and_judged(
+def fitted_and_judged(
     seen: Sequence[BenchLog], unseen: Sequence[BenchLog], robot: Robot, model: str
 ) -> list[Errors]:
+    """Returns the errors of a fit over each of some logs that it did not see."""
     return judged(fit_servo(seen, robot, model, seeds=1), unseen)

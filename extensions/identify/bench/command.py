@@ -27,9 +27,17 @@ from hexapod_cosim.extensions.identify.report import embedded, number
 from hexapod_cosim.models import HexapodError, Robot
 from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.servos.motor import torque_per_volt
-from hexapod_cosim.models.servos.presets import list_servos, measured_servo
+from hexapod_cosim.models.servos.presets import followed, list_servos, measured_servo
 
-STARTS = {"xl330": "xl330_m4", "sts3215": "sts3215_12v", "sts3250": "sts3250"}  # by the logs' motor
+PRESETS = {"xl330": "xl330_fitted", "sts3215": "sts3215_12v", "sts3250": "sts3250"}  # of motors
+# Where a fit begins: servos that others published, with the makers' stall current [A] and no-load
+# speeds [rad/s]. None comes from the logs that a fit may be judged on.
+FEETECH = {"voltage": 12.0, "overload_time": 1.0, "overload_duty": 0.8, "overload_left": 0.2}
+STARTS: dict[str, tuple[str, dict[str, Any]]] = {
+    "xl330": ("xl330_m4", {"current_max": 1.47}),
+    "sts3215": ("sts3215_m1", {"goal_speed_max": 4.7, **FEETECH}),
+    "sts3250": ("sts3215_m1", {"goal_speed_max": 7.9, **FEETECH}),
+}
 SERVO, RESULT, REPORT = "servo.toml", "identify.json", "report.html"
 NUMBERS = ("number", "unit", "start", "found", "95 % interval")
 ERRORS = ("angle [deg]", "speed [rad/s]", "duty", "torque")
@@ -45,9 +53,9 @@ FOUND = (
 )  # fmt: skip
 
 
-def with_start(robot: Robot, logs: Sequence[BenchLog]) -> Robot:
-    """Returns the robot with the servo that its logs are compared with: its own measured one, or
-    the one of `hexapod list servos` for the logs' motor. Raises HexapodError where there is none.
+def with_start(robot: Robot, logs: Sequence[BenchLog], *, preset: bool = False) -> Robot:
+    """Returns the robot with the servo that a fit to logs begins at: its own measured one, or
+    that of STARTS for the logs' motor, or of PRESETS. Raises HexapodError where there is none.
     """
     motor = logs[0].motor
     if robot.servo.drive == "motor":
@@ -60,7 +68,8 @@ def with_start(robot: Robot, logs: Sequence[BenchLog]) -> Robot:
             fix='name a robot file with [servo] model = "..." as --robot',
             where=logs[0].where,
         )
-    return replace(robot, servo=measured_servo(STARTS[motor]).servo)
+    name, changed = (PRESETS[motor], {}) if preset else STARTS[motor]
+    return replace(robot, servo=followed(replace(measured_servo(name).servo, **changed)))
 
 
 def identified_servo(
@@ -170,7 +179,7 @@ class BenchReplay:
 def replayed(path: Path, robot: Robot) -> BenchReplay:
     """Simulates a bench log with the robot's servo; offset and delay of the bench are fitted."""
     log = read_bench_log(path)
-    found = fit_servo([log], with_start(robot, [log]), None, seeds=1)
+    found = fit_servo([log], with_start(robot, [log], preset=True), None, seeds=1)
     bench, servo = Bench([log]), found.robot.servo
     swing = found.swing(bench)
     return BenchReplay(bench, swing, servo, log_errors(bench, swing, servo)[0])

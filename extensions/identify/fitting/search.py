@@ -16,12 +16,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.extensions.identify.fitting.least_squares import (
-    FINE,
-    huber,
-    minimised,
-    stepped,
-)
+from hexapod_cosim.extensions.identify.fitting.least_squares import FINE, huber, minimised, stepped
 from hexapod_cosim.extensions.identify.fitting.misfit import read_noise
 from hexapod_cosim.extensions.identify.fitting.problem import Problem
 from hexapod_cosim.extensions.identify.unknowns import DELAYS

@@ -124,10 +124,10 @@ LEAST = 1e-3  # of a typical term: a smaller one of the file is as none
 APART = 1.1  # between the coefficients of motor and load where the search of M5, M6 begins
 
 
-def with_friction_model(robot: Robot, model: str) -> Robot:
+def with_friction_model(robot: Robot, model: str, *, share: float = FIRST) -> Robot:
     """Returns the robot with the terms of a friction model; other terms are 0.
 
-    Terms are the robot file's, and a part of what is typical of servos of its size where it has
+    Terms are the robot file's, and a share of what is typical of servos of its size where it has
     none.
 
     Raises HexapodError for an unknown model, and for a servo without a model of its motor, which
@@ -147,7 +147,7 @@ def with_friction_model(robot: Robot, model: str) -> Robot:
     values: dict[str, Any] = dict.fromkeys(typical, 0.0)
     for key in ("coulomb_friction", "viscous_friction", *TERMS[model]):
         own = getattr(servo, key)
-        values[key] = own if own > LEAST * typical[key] else FIRST * typical[key]
+        values[key] = own if own > LEAST * typical[key] else share * typical[key]
     for motor, external in (LOADS, STRIBECK_LOADS):
         if model in SINGLE:
             values[motor] = values[external] = 0.5 * (values[motor] + values[external])

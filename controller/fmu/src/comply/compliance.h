@@ -31,18 +31,21 @@ typedef struct hxCompliance {
   hxLandings landings;
   hxBurden burden;
   hxTrust trust;
-  int touching[HX_LEGS];
+  int felt[HX_LEGS];                 /* the foot's sensor reports a contact */
+  int touching[HX_LEGS];             /* the foot is on the ground */
   double load[HX_LEGS];              /* 1    smoothed, in thirds of the weight */
   double torque[HX_LEGS][HX_JOINTS]; /* N m, for the servos */
-  int doubted[HX_LEGS];              /* the foot's sensor is not trusted */
-  /* walks without feedback, because the sensor is not trusted, the robot slides, or its joints do
-   * not follow */
-  int fallback[HX_LEGS];
+  int doubted[HX_LEGS];              /* the foot's sensor is replaced */
+  int misled[HX_LEGS];  /* the foot follows its path: it has just been doubted, or all are */
+  int fallback;         /* kinematic control: the robot slides or is far too heavy */
   double grip[HX_LEGS]; /* 1, factor on the planned load of a leg that is regaining contact */
   int regaining;        /* some grip may be below 1 */
   double scale;         /* 1    measured over planned weight */
   hxPlane lean;         /* m, of the measured centre of mass from the modelled one, walking frame */
   double held;          /* 1, share of the planned squeeze that the ground holds, smoothed */
+  /* scale, heft and lean before a sensor contradicted the plan */
+  double sure_scale, sure_heft;
+  hxPlane sure_lean;
 } hxCompliance;
 
 /* 1, of the weight: feet that carry less in all have only just met the ground */
@@ -55,6 +58,10 @@ static const double least_scale = 0.5, largest_scale = 3.0;
 static const double largest_lean = 0.4;
 /* 1, of the step height: a foot that is planned higher is in the air for certain */
 static const double high_share = 0.25;
+/* 1, of its planned load, or a third of the weight: a doubted foot bears no more */
+static const double likely = 1.2;
+/* 1, of the heft, which changes faster: a larger scale has settled */
+static const double weighed = 0.9;
 static const double carrying =
     0.1; /* 1, in thirds of the weight: an awaited foot with more stands */
 
@@ -93,7 +100,7 @@ static inline void hx_compliance_compile(const hxControllerDefinition *definitio
 
 static inline void hx_compliance_reset(hxCompliance *laws) {
   memset(laws, 0, sizeof *laws);
-  laws->trust.level = laws->held = 1.0;
+  laws->trust.level = laws->held = laws->sure_scale = laws->sure_heft = 1.0;
   hx_landings_reset(&laws->landings);
   hx_burden_reset(&laws->burden);
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->grip[leg] = 1.0;
@@ -110,37 +117,63 @@ static inline double hx_compliance_needed(const hxComplianceModel *model,
 
 /* ----------------------------------------------------------------------------------- contacts */
 
-/* Replaces the forces of sensors that are not trusted by the planned ones. */
-static inline void replace_forces(const hxLoadPlan *plan, double force[HX_LEGS][3],
-                                  hxCompliance *laws) {
+/* Returns the number of marked legs. */
+static inline int marks(const int marked[HX_LEGS]) {
+  int count = 0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) count += marked[leg];
+  return count;
+}
+
+/* Replaces the forces of sensors that are not trusted (C34). */
+static inline void replace_forces(const hxComplianceModel *model, const hxLoadPlan *plan,
+                                  double force[HX_LEGS][3], hxCompliance *laws) {
+  const hxShares *shares = &plan->shares;
+  const int count = marks(laws->doubted);
+  int before[HX_LEGS];
+  memcpy(before, laws->touching, sizeof before);
+  memcpy(laws->touching, laws->felt, sizeof laws->touching);
+  if (!count) return;
+  hx_replaced(shares->normal, laws->scale, laws->felt, laws->doubted, force);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     if (!laws->doubted[leg]) continue;
-    force[leg][0] = laws->scale * plan->shares.push[leg].x;
-    force[leg][1] = laws->scale * plan->shares.push[leg].y;
-    force[leg][2] = laws->scale * plan->shares.normal[leg];
-    laws->touching[leg] = plan->shares.activation[leg] > 0.5;
+    force[leg][0] = laws->scale * shares->push[leg].x;
+    force[leg][1] = laws->scale * shares->push[leg].y;
+    laws->touching[leg] = count == HX_LEGS
+                              ? shares->activation[leg] > 0.5
+                              : hx_sensor_watch_found(&model->watch, force[leg][2], before[leg]);
   }
 }
 
 /* Decides which sensors are trusted (C34). When the sensors of three feet are not, none is. met:
- * heights at which the feet meet the ground without a bump [m]. */
+ * heights at which the feet meet the ground without a bump [m]; force: that the laws use; reported:
+ * sum of the normal forces that the sensors report [N]. */
 static inline void judge_sensors(const hxComplianceModel *model, const hxLoadPlan *plan,
-                                 const double met[HX_LEGS], double force[HX_LEGS][3],
-                                 hxCompliance *laws) {
-  int high[HX_LEGS], due[HX_LEGS], doubted = 0;
-  double total = 0.0;
+                                 const double met[HX_LEGS], const double force[HX_LEGS][3],
+                                 double reported, hxCompliance *laws) {
+  int high[HX_LEGS], due[HX_LEGS], count = 0, fresh = 0;
+  double total[HX_LEGS], known = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     high[leg] = plan->height[leg] > model->high + met[leg];
     due[leg] = plan->standing[leg] || plan->awaited[leg];
-    total += laws->touching[leg] ? force[leg][2] : 0.0;
+    const double most = hx_larger(model->share, likely * laws->scale * plan->shares.normal[leg]);
+    known += laws->doubted[leg] && !high[leg] ? hx_smaller(force[leg][2], most) : 0.0;
   }
-  hx_sensor_watch_look(&model->watch, laws->touching, total, due, high, &laws->watch);
-  for (int leg = 0; leg < HX_LEGS; ++leg) doubted += laws->watch.left[leg] > 0.0;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    total[leg] = laws->doubted[leg] ? reported : reported + known;
+  hx_sensor_watch_look(&model->watch, laws->felt, total, due, high, &laws->watch);
+  for (int leg = 0; leg < HX_LEGS; ++leg) count += laws->watch.left[leg] > 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    laws->doubted[leg] = doubted >= HX_TRIPOD_LEGS || laws->watch.left[leg] > 0.0;
-    laws->fallback[leg] = laws->doubted[leg] || laws->trust.level < 1.0;
+    const int blind = count >= HX_TRIPOD_LEGS, doubted = blind || laws->watch.left[leg] > 0.0,
+              now = doubted && !laws->doubted[leg];
+    laws->misled[leg] =
+        blind || ((laws->misled[leg] || now) && doubted && plan->height[leg] <= hx_early);
+    laws->doubted[leg] = doubted;
+    fresh |= now;
   }
-  if (doubted) replace_forces(plan, force, laws);
+  if (!fresh) return;
+  laws->scale = laws->sure_scale;
+  laws->lean = laws->sure_lean;
+  laws->burden.heft = laws->sure_heft;
 }
 
 /* Returns whether a foot carries so much that the gait clock need not wait for it. */
@@ -157,18 +190,19 @@ static inline void meet_ground(const hxComplianceModel *model, const hxLoadPlan 
   hx_landings_early(&laws->landings, met, plan->height, early);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     falling[leg] = early[leg] ? plan->descent[leg] : 0.0;
-    searching[leg] = plan->awaited[leg] && !laws->doubted[leg] && !carries(laws, leg);
+    searching[leg] = plan->awaited[leg] && !laws->misled[leg] && !carries(laws, leg);
   }
   hx_touchdown_step(model->period, laws->touching, falling, plan->swinging, plan->standing,
-                    searching, laws->doubted, &laws->touchdown);
+                    searching, laws->misled, &laws->touchdown);
 }
 
-/* Decides between a wrong sensor and ground that is met early or late. */
+/* Decides between a wrong sensor and ground that is met early or late; as for judge_sensors. */
 static inline void examine_contacts(const hxComplianceModel *model, const hxLoadPlan *plan,
-                                    double force[HX_LEGS][3], hxCompliance *laws) {
+                                    const double force[HX_LEGS][3], double reported,
+                                    hxCompliance *laws) {
   double met[HX_LEGS];
   hx_landings_expected(&laws->landings, laws->touching, plan->height, plan->swinging, met);
-  if (model->parts.fallback) judge_sensors(model, plan, met, force, laws);
+  if (model->parts.fallback) judge_sensors(model, plan, met, force, reported, laws);
   if (laws->trust.level < 1.0)
     memset(&laws->touchdown, 0, sizeof laws->touchdown);
   else if (model->parts.touchdown)
@@ -185,16 +219,6 @@ static inline int contacts_differ(const hxLoadPlan *plan, const hxCompliance *la
 }
 
 /* -------------------------------------------------------------------------- inputs and weight */
-
-/* Updates the trust and with it the legs without feedback (C33). drag: as for hx_trust_step. */
-static inline void update_trust(const hxComplianceModel *model, const hxLoadPlan *plan, double drag,
-                                hxCompliance *laws) {
-  const double before = laws->trust.level,
-               goal = hx_trust_step(&model->trust, drag, plan->overspeed, laws->burden.overburdened,
-                                    &laws->trust);
-  if (before == goal) return;
-  for (int leg = 0; leg < HX_LEGS; ++leg) laws->fallback[leg] = laws->doubted[leg] || goal == 0.0;
-}
 
 /* Returns the share of the planned squeeze that creep has taken away, in [0, 1] (C46); 0 without
  * planned squeeze. deviation: of the tangential forces from the planned ones [N]. */
@@ -229,7 +253,9 @@ static inline double feel(const hxComplianceModel *model, const hxLoadPlan *plan
   }
   const double share = total > load_floor ? 1.0 / total : 0.0;
   if (model->parts.fallback)
-    update_trust(model, plan, total > model->settled ? hx_length(common) * share : 0.0, laws);
+    laws->fallback =
+        hx_trust_step(&model->trust, total > model->settled ? hx_length(common) * share : 0.0,
+                      laws->burden.overburdened, &laws->trust) == 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     laws->load[leg] += model->follow_load * (normal[leg] / model->share - laws->load[leg]);
   const double missing = squeeze_lost(plan, (const hxPlane *)deviation, laws);
@@ -260,9 +286,12 @@ static inline void update_weight(const hxComplianceModel *model, const hxLoadPla
                                  const double normal[HX_LEGS], double total, hxCompliance *laws) {
   const double ratio = total / hx_larger(plan->weight, load_floor),
                scale = hx_clamp(ratio, least_scale, largest_scale);
-  int doubted = 0;
-  for (int leg = 0; leg < HX_LEGS; ++leg) doubted |= laws->doubted[leg];
-  if (!doubted) {
+  if (laws->scale > weighed * laws->burden.heft && !hx_sensor_watch_contradicted(&laws->watch)) {
+    laws->sure_scale = laws->scale;
+    laws->sure_heft = laws->burden.heft;
+    laws->sure_lean = laws->lean;
+  }
+  if (!marks(laws->doubted)) {
     laws->scale += model->follow_weight * (scale - laws->scale);
     hx_burden_weigh(&model->burden, ratio, &laws->burden);
     update_lean(model, plan, normal, total, laws);
@@ -307,11 +336,11 @@ static inline const double *hx_compliance_raised(const hxCompliance *laws, int *
   return laws->touchdown.offset;
 }
 
-/* Returns whether a foot on its way down has met the ground, and not a sensor that lies (C51). */
+/* Returns whether a foot on its way down has met the ground (C51). */
 static inline int hx_compliance_meets(const hxComplianceModel *model, int leg,
                                       const hxCompliance *laws) {
   return model->parts.touchdown && laws->trust.level == 1.0 && laws->touching[leg] &&
-         !laws->doubted[leg];
+         !laws->misled[leg];
 }
 
 /* Returns whether the gait clock waits for the feet of legs that end their swing (C50). waiting: it
@@ -319,25 +348,27 @@ static inline int hx_compliance_meets(const hxComplianceModel *model, int leg,
 static inline int hx_compliance_waits(const hxComplianceModel *model, const int landing[HX_LEGS],
                                       int waiting, const hxCompliance *laws) {
   int waits = 0;
-  if (!model->parts.touchdown || laws->trust.level < 1.0 || hx_trust_feet_late(&laws->trust))
-    return 0;
+  if (!model->parts.touchdown || laws->trust.level < 1.0) return 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const int found = waiting ? carries(laws, leg) : laws->touching[leg];
-    waits |= landing[leg] && !found && !laws->doubted[leg] &&
+    waits |= landing[leg] && !found && !laws->misled[leg] &&
              laws->touchdown.offset[leg] > -hx_reach_limit;
   }
   return waits;
 }
 
-/* Advances the laws by one period. force: of the ground on the feet, walking frame [N]; replaced by
- * the planned one where a sensor is not trusted. */
+/* Advances the laws by one period. force: of the ground on the feet, walking frame [N]; replaced
+ * where a sensor is not trusted. */
 static inline void hx_compliance_step(const hxComplianceModel *model, const hxLoadPlan *plan,
                                       double force[HX_LEGS][3], hxCompliance *laws) {
-  double normal[HX_LEGS];
+  double normal[HX_LEGS], reported = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) normal[leg] = force[leg][2];
-  hx_contact_detector_step(model->weight, normal, laws->touching);
+  hx_contact_detector_step(model->weight, normal, laws->felt);
+  for (int leg = 0; leg < HX_LEGS; ++leg) reported += laws->felt[leg] ? normal[leg] : 0.0;
+  replace_forces(model, plan, force, laws);
   hx_landings_look(laws->touching, plan->height, plan->swinging, &laws->landings);
-  if (contacts_differ(plan, laws)) examine_contacts(model, plan, force, laws);
+  if (contacts_differ(plan, laws))
+    examine_contacts(model, plan, (const double (*)[3])force, reported, laws);
   const double total = feel(model, plan, (const double (*)[3])force, normal, laws);
   update_weight(model, plan, normal, total, laws);
   actuate(model, plan, laws);

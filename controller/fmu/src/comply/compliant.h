@@ -239,13 +239,15 @@ static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegS
     const double offset = offsets[k], raised = offset + compliant->hold.lift[k];
     correct(&leg[k], present->climb[k], raised, output->angle_ref[k]);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      double *speed = &output->speed_ref[k][joint];
       if (busy || compliant->moving)
-        output->speed_ref[k][joint] +=
-            present->climb[k][joint] * ((offset - compliant->offset[k]) * model->per_second);
+        *speed = hx_clamp(*speed + present->climb[k][joint] *
+                                       ((offset - compliant->offset[k]) * model->per_second),
+                          -leg[k].speed_max, leg[k].speed_max);
       output->torque_ref[k][joint] = laws->torque[k][joint];
     }
     if (busy || compliant->moving) compliant->offset[k] = offset;
-    output->fallback[k] = laws->fallback[k];
+    output->fallback[k] = laws->fallback;
     output->shift[k][0] = output->shift[k][1] = 0.0;
     output->lift[k] = raised;
   }

@@ -52,7 +52,6 @@ typedef struct hxLoadPlan {
   int swinging[HX_LEGS];
   int awaited[HX_LEGS];    /* the gait clock waits for the foot */
   double descent[HX_LEGS]; /* m, by which the feet come down in a period, at least 0 */
-  int overspeed;           /* the plan exceeds the speed limit of some joint */
 } hxLoadPlan;
 
 /* Computes the rest of a plan whose shares and contacts are set. active: the servos carry the load;

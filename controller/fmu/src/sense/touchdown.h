@@ -53,17 +53,17 @@ static inline double moved(double offset, double late, double waited, double per
 /* Advances by one period [s] (C36). touching: feet that report a force; falling: distance by which
  * the path of a foot that met the ground early moves down in this period [m], 0 for the others;
  * swinging: legs planned in the air; loaded: legs planned to carry their whole share; searching:
- * feet that the gait clock waits for; doubted: feet whose sensors are not trusted. */
+ * feet that the gait clock waits for; misled: feet whose sensors have just been doubted. */
 static inline void hx_touchdown_step(double period, const int touching[HX_LEGS],
                                      const double falling[HX_LEGS], const int swinging[HX_LEGS],
                                      const int loaded[HX_LEGS], const int searching[HX_LEGS],
-                                     const int doubted[HX_LEGS], hxTouchdown *touchdown) {
+                                     const int misled[HX_LEGS], hxTouchdown *touchdown) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int misses = loaded[leg] && !touching[leg] && !doubted[leg];
+    const int misses = loaded[leg] && !touching[leg] && !misled[leg];
     const double offset = touchdown->offset[leg];
     touchdown->late[leg] = misses ? touchdown->late[leg] + period : 0.0;
     touchdown->waited[leg] = searching[leg] ? touchdown->waited[leg] + period : 0.0;
-    touchdown->offset[leg] = doubted[leg]
+    touchdown->offset[leg] = misled[leg]
                                  ? faded(offset, period)
                                  : moved(offset, touchdown->late[leg], touchdown->waited[leg],
                                          period, touching[leg], falling[leg], swinging[leg]);

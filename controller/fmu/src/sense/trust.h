@@ -6,15 +6,13 @@
 #include "../plane.h"
 
 typedef struct hxTrustModel {
-  double period;                    /* s */
-  double follow_load, follow_cycle; /* 1, factors of the smoothings over a period */
-  int64_t calm;                     /* steps without sliding until feet are trusted again */
+  double period;      /* s */
+  double follow_load; /* 1, factor of the smoothing over a period */
+  int64_t calm;       /* steps without sliding until feet are trusted again */
 } hxTrustModel;
 
 typedef struct hxTrust {
   double level;             /* 1, factor on all torques */
-  int lagging;              /* the joints cannot follow the plan */
-  double overspeed_share;   /* 1, share of the time in which the plan exceeds a speed limit */
   int64_t slide_periods;    /* steps for which the robot has been sliding */
   int64_t recovery_periods; /* steps that remain until feedback resumes after sliding */
 } hxTrust;
@@ -22,6 +20,7 @@ typedef struct hxTrust {
 /* Finds the foot sensors that contradict the plan for too long (C34). */
 typedef struct hxSensorWatchModel {
   double period;  /* s */
+  double weight;  /* N */
   double missing; /* N, when all feet measure less, some sensor reports too little */
   double memory;  /* s, time without contradiction until a sensor is trusted again */
 } hxSensorWatchModel;
@@ -36,10 +35,7 @@ static const double sliding_drag = 0.55;
 /* 1, gait cycles without sliding until feet are trusted again */
 static const double calm_cycles = 0.5;
 static const double sliding_time = 0.04; /* s, longer than a foot skids at touch-down */
-/* 1, share of the time in which joints would need more speed than a servo has */
-static const double joints_follow = 0.35, joints_do_not = 0.45;
-static const double feet_late = 0.2; /* 1, the same, from which feet end their swings late */
-static const double trusted = 0.99;  /* 1, so near to its goal the trust is at it */
+static const double trusted = 0.99;      /* 1, so near to its goal the trust is at it */
 /* s, a force of this duration on a foot in mid-swing is a contradiction */
 static const double airborne_time = 0.06;
 /* s, no force for this time on a foot that should carry load is a contradiction; both exceed the
@@ -47,35 +43,31 @@ static const double airborne_time = 0.06;
 static const double absent_time = 0.10;
 static const double missing_share = 0.92; /* 1  of the weight */
 static const double memory_cycles = 1.5;  /* 1  gait cycles */
+/* 1, of the weight: as touch_share and lift_share, for a doubted foot; more, because torso and feet
+ * accelerate */
+static const double found_part = 0.10, gone_part = 0.03;
+/* N, of a doubted foot, so that the shares of feet in the air are not 0 / 0 */
+static const double least_share = 1e-6;
 
 static inline void hx_trust_compile(const hxControllerDefinition *definition, hxTrustModel *model) {
   const double period = definition->period, cycle = definition->gait.period;
   model->period = period;
   model->follow_load = 1.0 - hx_decay(-period / definition->gains.support.load_time);
-  model->follow_cycle = 1.0 - hx_decay(-period / cycle);
   const double calm = nearbyint(calm_cycles * cycle / period);
   model->calm = (int64_t)calm;
 }
 
-/* Returns whether the joints are so slow that feet end their swings late anywhere. */
-static inline int hx_trust_feet_late(const hxTrust *trust) {
-  return trust->overspeed_share > feet_late;
-}
-
 /* Advances the trust by one period (C33) and returns the level that it goes to, 0 or 1. drag: the
- * common tangential force of the feet beyond the plan, over the normal force; overspeed: the plan
- * exceeds the speed limit of some joint; overburdened: the robot is far too heavy for its servos.
- */
-static inline double hx_trust_step(const hxTrustModel *model, double drag, int overspeed,
-                                   int overburdened, hxTrust *trust) {
-  trust->overspeed_share += model->follow_cycle * ((double)overspeed - trust->overspeed_share);
-  trust->lagging = trust->overspeed_share > (trust->lagging ? joints_follow : joints_do_not);
+ * common tangential force of the feet beyond the plan, over the normal force; overburdened: the
+ * robot is far too heavy for its servos. */
+static inline double hx_trust_step(const hxTrustModel *model, double drag, int overburdened,
+                                   hxTrust *trust) {
   trust->slide_periods = drag > sliding_drag ? trust->slide_periods + 1 : 0;
   if ((double)trust->slide_periods * model->period > sliding_time)
     trust->recovery_periods = model->calm;
   else if (trust->recovery_periods)
     --trust->recovery_periods;
-  const double goal = trust->recovery_periods || trust->lagging || overburdened ? 0.0 : 1.0;
+  const double goal = trust->recovery_periods || overburdened ? 0.0 : 1.0;
   if (trust->level == goal) return goal;
   trust->level += model->follow_load * (goal - trust->level);
   if (fabs(goal - trust->level) < 1.0 - trusted) trust->level = goal;
@@ -85,32 +77,63 @@ static inline double hx_trust_step(const hxTrustModel *model, double drag, int o
 static inline void hx_sensor_watch_compile(double weight, double cycle, double period,
                                            hxSensorWatchModel *model) {
   model->period = period;
+  model->weight = weight;
   model->missing = missing_share * weight;
   model->memory = memory_cycles * cycle;
 }
 
+/* Returns whether some sensor contradicts the plan. */
+static inline int hx_sensor_watch_contradicted(const hxSensorWatch *watch) {
+  int found = 0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) found |= watch->contradicted[leg] != 0.0;
+  return found;
+}
+
 /* Returns whether some sensor contradicts the plan or is not trusted. */
 static inline int hx_sensor_watch_busy(const hxSensorWatch *watch) {
-  int busy = 0;
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    busy |= watch->contradicted[leg] != 0.0 || watch->left[leg] != 0.0;
+  int busy = hx_sensor_watch_contradicted(watch);
+  for (int leg = 0; leg < HX_LEGS; ++leg) busy |= watch->left[leg] != 0.0;
   return busy;
 }
 
-/* Advances by one period. touching, total: feet that report a force, and the sum of all normal
- * forces [N]; standing: planned to carry their whole share; high: planned well above the ground. */
+/* Advances by one period. touching: feet that report a force; total: the sum of all normal forces,
+ * for each foot [N]; standing: planned to carry their whole share; high: planned well above the
+ * ground. */
 static inline void hx_sensor_watch_look(const hxSensorWatchModel *model,
-                                        const int touching[HX_LEGS], double total,
+                                        const int touching[HX_LEGS], const double total[HX_LEGS],
                                         const int standing[HX_LEGS], const int high[HX_LEGS],
                                         hxSensorWatch *watch) {
-  const int missing = total < model->missing;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int up = high[leg];
+    const int up = high[leg], missing = total[leg] < model->missing;
     const int wrong = (touching[leg] && up) || (missing && standing[leg] && !touching[leg]);
     watch->contradicted[leg] = wrong ? watch->contradicted[leg] + model->period : 0.0;
     const int too_long = watch->contradicted[leg] > (up ? airborne_time : absent_time);
     watch->left[leg] = too_long ? model->memory : fmax(watch->left[leg] - model->period, 0.0);
   }
+}
+
+/* Returns whether a doubted foot has contact (C34). load: that replaces the measured one [N];
+ * touching: a period ago. */
+static inline int hx_sensor_watch_found(const hxSensorWatchModel *model, double load,
+                                        int touching) {
+  return load > (touching ? gone_part : found_part) * model->weight;
+}
+
+/* Replaces the normal forces of the doubted feet, of which there is one at least (C34): they carry
+ * what the others leave of the weight, in the shares of the plan. planned, scale: normal forces [N]
+ * and the ratio of measured to planned weight; touching: feet that report a force. */
+static inline void hx_replaced(const double planned[HX_LEGS], double scale,
+                               const int touching[HX_LEGS], const int doubted[HX_LEGS],
+                               double force[HX_LEGS][3]) {
+  double left = 0.0, whole = 0.0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const double load = scale * planned[leg];
+    left += load - (touching[leg] && !doubted[leg] ? force[leg][2] : 0.0);
+    whole += doubted[leg] ? load + least_share : 0.0;
+  }
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    if (doubted[leg])
+      force[leg][2] = hx_larger(left, 0.0) * (scale * planned[leg] + least_share) / whole;
 }
 
 #endif

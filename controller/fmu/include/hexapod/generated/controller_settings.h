@@ -157,8 +157,8 @@ typedef struct hxParts {
   int path;
   /* 0 or 1  Part of the compliant control: torques are limited */
   int limits;
-  /* 0 or 1  Part of the compliant control: no feedback from a sensor that contradicts the plan;
-   * kinematic control while the robot slides or outruns its joints */
+  /* 0 or 1  Part of the compliant control: a sensor that contradicts the plan is replaced;
+   * kinematic control while the robot slides */
   int fallback;
   /* 1  Weight of the servos' torques against the feet's use of friction in the planned squeeze of
    * the legs; 0 plans none */
@@ -242,8 +242,7 @@ typedef struct hxControllerOutput {
   int swinging[6];
   /* 0 or 1  The leg's joints cannot follow the foot's path */
   int unreachable[6];
-  /* 0 or 1  The leg walks without feedback: its sensor is not believed, or the robot slides or
-   * outruns its joints */
+  /* 0 or 1  The leg walks without feedback: the robot slides */
   int fallback[6];
   /* m  Horizontal correction of the foot by the compliance, walking frame */
   double shift[6][2];
@@ -258,6 +257,9 @@ typedef struct hxControllerOutput {
   /* 0 or 1  The servo does not do what it is told: it is limp or locked, or its angle sensor is
    * wrong */
   int faulty[6][3];
+  /* 0 or 1  The commanded velocity is too fast for the leg's joints: the body walks at the share of
+   * it that they can follow */
+  int outrun[6];
 } hxControllerOutput;
 
 #endif
