@@ -163,6 +163,7 @@ class Controller(Stateful):
         self.plan.carry(plan)
         self.fade.begin(self._out)
         self._show(np.zeros((LEGS, 3)), NO_LEG)
+        self.diagnostics.doubted[...] = False
 
     # --------------------------------------------------------------------------------- joints
 
@@ -288,3 +289,4 @@ class Controller(Stateful):
             raised = self.compliant.step(step, measurement, self._out)
             still = np.zeros(LEGS)
             self._show(rows_of(still, still, raised), self.compliant.laws.fallback)
+            self.diagnostics.doubted[...] = self.compliant.laws.doubted

@@ -61,5 +61,6 @@ class Diagnostics:
     fallback: Mask = field(default_factory=_flags)  # under kinematic control
     absent: Mask = field(default_factory=_flags)  # out of service: the others walk without it
     outrun: Mask = field(default_factory=_flags)  # too slow for the command: the body walks slower
+    doubted: Mask = field(default_factory=_flags)  # force sensors that are replaced by estimates
     # (3, 6) joints and legs: servos that do not follow their commands
     faulty: Mask = field(default_factory=lambda: np.zeros((3, LEGS), dtype=np.bool_))

@@ -77,10 +77,10 @@ class FmuLaw:
         ]
         shifts, lifts, feet = np.split(info, [2 * LEGS, 3 * LEGS])
         self._flags = np.zeros((len(FLAGS), LEGS), dtype=np.bool_)
-        swinging, unreachable, fallback, absent, outrun, *_ = self._flags
+        swinging, unreachable, fallback, absent, outrun, doubted, *_ = self._flags
         self.diagnostics = Diagnostics(
             swinging, feet.reshape(LEGS, 3), shifts.view(np.complex128), lifts, unreachable,
-            fallback, absent, outrun, self._flags[-JOINTS:],
+            fallback, absent, outrun, doubted, self._flags[-JOINTS:],
         )  # fmt: skip
 
     @property

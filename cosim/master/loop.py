@@ -111,7 +111,7 @@ def diagnostic_columns(controller: JointController) -> dict[tuple[str, ...], NDA
         return {}
     columns: dict[tuple[str, ...], NDArray[Any]] = {
         tuple(f"controller.{leg}.{key}" for leg in LEG_NAMES): getattr(shown, key)
-        for key in ("swinging", "unreachable", "lift", "fallback", "absent", "outrun")
+        for key in ("swinging", "unreachable", "lift", "fallback", "absent", "outrun", "doubted")
     }
     # the columns are the controller's own arrays, which change with every call; a complex number
     # lies in memory as x, y

@@ -48,6 +48,11 @@ FINDINGS = (  # flag of the controller, what its begin and its end mean
         "the command is too fast for the joints of {leg}: the body walks slower",
         "the command is no longer too fast for the joints of {leg}",
     ),
+    (
+        "doubted",
+        "the controller replaces the force of the foot {leg}, whose sensor contradicts the plan",
+        "the controller trusts the force sensor of the foot {leg} again",
+    ),
 )
 SURELY = 2.0  # times the least walk: a shorter commanded way asks for no walk
 UPRIGHT = 0.6  # rad

@@ -31,7 +31,7 @@ def fallback_warnings(recording: Recording) -> list[str]:
     found = [f"{leg} {share:.0%}" for leg, share in shares if share]
     return [
         f"legs walked without feedback for a share of the time ({', '.join(found)}): the robot "
-        "slid or was far too heavy"
+        "slid, or it is far too heavy for its servos"
     ]
 
 

@@ -105,6 +105,9 @@ def test_with_a_dead_sensor_it_walks_on_without_fallback() -> None:
     assert hurt.facts.walk.upright
     assert hurt.facts.walk.fallback == 0.0
     assert hurt.facts.walk.distance == pytest.approx(whole.facts.walk.distance, rel=0.03)
+    doubted = [f"controller.{leg}.doubted" for leg in ("LF", "LM", "LR", "RF", "RM", "RR")]
+    assert np.flatnonzero(hurt.outcome.recording.columns(doubted).any(axis=0)).tolist() == [4]
+    assert not whole.outcome.recording.columns(doubted).any()
     assert hurt.metrics["slip_per_metre"] < walk("athena", "kinematic").metrics["slip_per_metre"]
 
 

@@ -121,7 +121,7 @@ def differences(
         worst = np.maximum(worst, gap.max(axis=(1, 2)) / scale)
         if not (worst <= LIMITS).all():
             break
-        for flag in ("swinging", "unreachable", "fallback", "absent", "outrun"):
+        for flag in ("swinging", "unreachable", "fallback", "absent", "outrun", "doubted"):
             assert [bool(value) for value in getattr(out, flag)] == getattr(shown, flag).tolist(), (
                 f"{flag} at step {k}"
             )

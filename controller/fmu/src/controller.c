@@ -44,6 +44,7 @@ void hx_controller_exchange(hxControllerModel *model, const hxFootPathsModel *be
   memset(output->shift, 0, sizeof output->shift);
   memset(output->lift, 0, sizeof output->lift);
   memset(output->fallback, 0, sizeof output->fallback);
+  memset(output->doubted, 0, sizeof output->doubted);
 }
 
 /* ------------------------------------------------------------------------------------- joints */

@@ -248,6 +248,7 @@ static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegS
     }
     if (busy || compliant->moving) compliant->offset[k] = offset;
     output->fallback[k] = laws->fallback;
+    output->doubted[k] = laws->doubted[k];
     output->shift[k][0] = output->shift[k][1] = 0.0;
     output->lift[k] = raised;
   }

@@ -260,6 +260,8 @@ typedef struct hxControllerOutput {
   /* 0 or 1  The commanded velocity is too fast for the leg's joints: the body walks at the share of
    * it that they can follow */
   int outrun[6];
+  /* 0 or 1  The foot's force sensor contradicts the plan: its force is replaced by an estimate */
+  int doubted[6];
 } hxControllerOutput;
 
 #endif
