@@ -2,8 +2,9 @@
 
 The model of a servo says which torque it gives at its measured angle. The foot's measured force and
 the levers of the leg say which torque its joint needs. What is left, the unexplained torque, is
-small while the servo works: its own weight and inertia, and errors of the model. A limp servo gives
-no torque, however far its joint is from the command; a locked one resists the command without any
+small while the servo works: its own weight, and errors of the model. Damping and the inertia of the
+rotor, which the model does not know exactly, explain a torque between bounds. A limp servo gives no
+torque, however far its joint is from the command; a locked one resists the command without any
 load. Either way the model gives a torque near the servo's largest that nothing explains.
 """
 
@@ -21,7 +22,8 @@ from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
 
 STRANGE_SHARE = 0.5  # 1    of the largest torque, that nothing explains
-STRANGE_TIME = 0.06  # s    in one direction: the servo does not work
+STRANGE_TIME = 0.035  # s    in one direction: the servo does not work
+DAMPING_TIME = 0.02  # s    largest damping over stiffness, besides the drag of the model
 STILL_SPEED = 0.05  # rad/s    of a joint that does not move
 SOUND_SHARE = 0.35  # 1    of the largest torque: the servo seems to work
 PROOF_TIME = 1.2  # s    for which a servo must seem to work: longer than a period of the trial
@@ -33,26 +35,28 @@ class Health(Stateful):
     Attributes, (6, 3) each:
         strange: time for which its torque has been unexplained, with its sign [s].
         angle: measured at the last step [rad].
+        speed: of the joint in the period before it [rad/s].
         still: time for which a joint has not moved [s].
         locked: faulty servos whose joints did not move when this was found.
         proof: time for which a servo has seemed to work [s].
         faulty: servos that do not work.
     """
 
-    STATE = ("strange", "angle", "still", "locked", "proof", "faulty")
+    STATE = ("strange", "angle", "speed", "still", "locked", "proof", "faulty")
 
     def __init__(
         self, robot: Robot, gains: Gains | None, *, legs: LegSolver, period: float
     ) -> None:
         """Starts with sound servos. Kinematic control, without gains, does not watch them."""
         self.stiffness, self.drag = robot.servo.kp, robot.servo.drag
+        self.rotor = robot.servo.rotor_inertia
         self.legs, self.period = legs, period
         self.most = math.inf if gains is None else gains.limits.torque  # N m
         self.reset()
 
     def reset(self) -> None:
         """Starts anew with sound servos."""
-        self.strange, self.proof, self.still = np.zeros((3, LEGS, 3))
+        self.strange, self.proof, self.still, self.speed = np.zeros((4, LEGS, 3))
         self.locked: Mask = np.zeros((LEGS, 3), dtype=np.bool_)
         self.angle: Array | None = None
         self.faulty: Mask = np.zeros((LEGS, 3), dtype=np.bool_)
@@ -63,15 +67,23 @@ class Health(Stateful):
         return np.asarray(self.faulty.any(axis=1))
 
     def _unexplained(self, angle: Array, force: Array, command: JointCommand) -> Array:
-        """Returns the torques (6, 3) of the servos' model that no load explains [N m]."""
+        """Returns the torques (6, 3) of the servos' model that nothing explains [N m]."""
         before = angle if self.angle is None else self.angle
         speed = (angle - before) / self.period
         load = speed / self.legs.speed_max
-        reached = command.angle_ref + self.period * command.speed_ref
-        torque = self.stiffness * (reached - angle) + command.torque_ref - self.drag * speed
         low = -self.most * clamp(1.0 + load, 0.0, 1.0)
-        torque = clamp(torque, low, self.most * clamp(1.0 - load, 0.0, 1.0))
-        return np.asarray(torque - self.legs.load_torques(angle, force))
+        high = self.most * clamp(1.0 - load, 0.0, 1.0)
+        fastest = self.legs.speed_max
+        reached = command.angle_ref + self.period * clamp(command.speed_ref, -fastest, fastest)
+        torque = self.stiffness * (reached - angle) + command.torque_ref - self.drag * speed
+        damping, nothing = DAMPING_TIME * self.stiffness, np.zeros((LEGS, 3))
+        added = np.array([nothing, -damping * speed, damping * (command.speed_ref - speed)])
+        torques = clamp(torque + added, low, high) - self.legs.load_torques(angle, force)
+        spin = self.rotor / self.period * (speed - self.speed)
+        self.speed = speed
+        least = torques.min(axis=0) - np.maximum(spin, 0.0)
+        most = torques.max(axis=0) - np.minimum(spin, 0.0)
+        return np.asarray(np.maximum(least, 0.0) + np.minimum(most, 0.0))
 
     def step(self, angle: Array, force: Array, command: JointCommand) -> None:
         """Judges the servos by a period under a command.

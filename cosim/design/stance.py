@@ -42,6 +42,7 @@ RESERVE = 1.25  # 1    stride that the legs must reach, over that of the gait
 SPEED_SHARE = 0.8  # 1    of a servo's largest speed that a walk may need
 FIRMNESS = 0.25  # 1    distance of the centre of mass from the polygon's edge, of its height
 APART = 4.0  # 1    radii of a foot between the ranges of neighbouring feet
+UNLIMITED = 1e6  # rad/s    largest speed of joints that no walk reaches
 LIFTED = 0.5  # 1    of the step height, by which a foot can be lifted at least
 HIGHER = 0.15  # 1    of the depth of the ground: most change of the torso's height
 FIRST_STEP, LAST_STEP = 0.16, 0.01  # 1    of the depth of the ground: sizes of the search's steps
@@ -256,9 +257,12 @@ class Motion:
 
 
 def settled_motion(robot: Robot, gait: Gait, command: BodyCommand) -> Motion:
-    """Returns what a settled walk under a command needs of the joints."""
+    """Returns what a settled walk under a command needs of joints of any speed, which slow no body
+    down (C59).
+    """
     period = gait.period / STEPS
-    controller = Controller(robot, period=period, gait=gait)
+    free = replace(robot, servo=replace(robot.servo, speed_max=UNLIMITED))
+    controller = Controller(free, period=period, gait=gait)
     measured, largest, shown = Measurement(), 0.0, controller.diagnostics
     cut = False
     for step in range(3 * STEPS):

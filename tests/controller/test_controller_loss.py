@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gains import make_gains
@@ -24,12 +26,18 @@ def mask(*legs: int) -> Mask:
 
 
 def steps_until_faulty(
-    offset: float, *, force: float = 0.0, drift: float = 0.0, most: int = 100, robot: Robot = ROBOT
+    offset: float,
+    *,
+    force: float = 0.0,
+    drift: float = 0.0,
+    speed_ref: float | None = None,
+    most: int = 100,
+    robot: Robot = ROBOT,
 ) -> int:
     """Returns the steps until the femur of LF is found faulty, `most` if it is not.
 
     offset: of its command from its angle [rad]; force: on its foot, upwards [N]; drift: of angle
-    and command [rad/s].
+    and command [rad/s]; speed_ref: commanded [rad/s], by default none.
     """
     health = Health(robot, make_gains(robot), legs=LegSolver(robot), period=H)
     command, forces, angle = JointCommand(), np.zeros((LEGS, 3)), robot.stance.copy()
@@ -38,6 +46,9 @@ def steps_until_faulty(
         angle[LF, 1] += drift * H
         command.angle_ref[...] = angle
         command.angle_ref[LF, 1] += offset
+        if speed_ref is not None:
+            command.speed_ref[LF, 1] = speed_ref
+            command.angle_ref[LF, 1] -= speed_ref * H
         health.step(angle, forces, command)
         if health.faulty.any():
             assert np.argwhere(health.faulty).tolist() == [[LF, 1]]
@@ -63,6 +74,28 @@ def test_a_load_explains_a_torque() -> None:
     assert lever == pytest.approx(-0.12, abs=1e-9)  # m    the foot's distance from its joint
     assert steps_until_faulty(-0.10, force=30.0) == 100
     assert steps_until_faulty(0.10, force=30.0) < 100
+
+
+def test_damping_by_a_commanded_speed_explains_a_torque() -> None:
+    """At most 0.02 s x 40 N m/rad: of 4 N m, 2.4 are left at -2 rad/s, and 3.2 at -1 rad/s."""
+    assert steps_until_faulty(0.10, speed_ref=-2.0) == 100
+    assert steps_until_faulty(0.10, speed_ref=-1.0) == pytest.approx(STRANGE_TIME / H, abs=1)
+    assert steps_until_faulty(0.10, speed_ref=2.0) == pytest.approx(STRANGE_TIME / H, abs=1)
+
+
+def test_a_rotor_that_slows_down_explains_a_torque() -> None:
+    """0.01 kg m2 at 200 rad/s2 takes 2 of 4 N m, for longer than a fault takes to be found."""
+    robot = replace(ROBOT, servo=replace(ROBOT.servo, speed_max=1e3))
+    health = Health(robot, make_gains(robot), legs=LegSolver(robot), period=H)
+    command, forces, angle, speed = JointCommand(), np.zeros((LEGS, 3)), robot.stance.copy(), -20.0
+    for _ in range(20):
+        speed += 200.0 * H
+        angle[LF, 1] += speed * H
+        command.angle_ref[...] = angle + mask(LF)[:, None] * [0.0, 0.1, 0.0]
+        command.speed_ref[LF, 1] = speed
+        command.angle_ref[LF, 1] -= speed * H
+        health.step(angle, forces, command)
+        assert not health.lost.any()
 
 
 def test_a_joint_that_is_as_fast_as_it_can_is_no_fault() -> None:

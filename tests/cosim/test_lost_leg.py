@@ -9,8 +9,11 @@ from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 
 
-@pytest.mark.parametrize("control", ["compliant", "paper"])
-def test_a_robot_that_loses_a_leg_walks_on_at_its_pace_and_takes_the_leg_back(control: str) -> None:
+# the paper's law corrects no path, so that a torso which turned while it tipped stays turned
+@pytest.mark.parametrize(("control", "path_error"), [("compliant", 0.05), ("paper", 0.08)])
+def test_a_robot_that_loses_a_leg_walks_on_at_its_pace_and_takes_the_leg_back(
+    control: str, path_error: float
+) -> None:
     with Runner() as runner:
         result = runner.simulate(load_scenario("lost_leg", overrides=[f"control={control}"]))
     recording = result.outcome.judged
@@ -25,5 +28,5 @@ def test_a_robot_that_loses_a_leg_walks_on_at_its_pace_and_takes_the_leg_back(co
     place = recording.column("torso.position[1]")
     pace = (np.interp(9.0, recording.time, place) - np.interp(7.0, recording.time, place)) / 2.0
     assert pace == pytest.approx(0.08, rel=0.1)
-    assert result.metrics["path_error"] < 0.06
+    assert result.metrics["path_error"] < path_error
     assert result.facts.walk.upright

@@ -54,7 +54,7 @@ def barely_met(force: np.ndarray, step: int) -> None:
 def heavy(force: np.ndarray, step: int) -> None:
     if step >= 300:
         force *= (
-            2.1 if step < 900 else 3.0 if step < 1250 else 1.0
+            2.1 if step < 900 else 4.0 if step < 1250 else 1.0
         )  # more than the servos carry, then far more, then the planned load
 
 
@@ -80,7 +80,7 @@ def test_sensors_that_lie_ground_that_is_missing_and_slides_are_answered_at_the_
         assert controller.compliant is not None
         doubted[...] |= controller.compliant.laws.doubted
 
-    # with a planned squeeze even three times the weight does not ask too much of the second robot
+    # with a planned squeeze even four times the weight does not ask too much of the second robot
     setup = setup_of(name, parts=Parts(squeeze=0.0))
     worst, fallback = differences(controller_core, setup, sense=sense)
     assert close(worst)

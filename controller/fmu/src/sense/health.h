@@ -8,6 +8,7 @@
 typedef struct hxHealthModel {
   double stiffness; /* N m/rad  of the servos */
   double drag;      /* N m s/rad  that the speed takes from their torque */
+  double rotor;     /* kg m2, inertia at the joint */
   double most;      /* N m, largest torque */
   double period;    /* s */
 } hxHealthModel;
@@ -17,15 +18,18 @@ typedef struct hxHealth {
   double still[HX_LEGS][HX_JOINTS];   /* s, for which the joint has not moved */
   double proof[HX_LEGS][HX_JOINTS];   /* s, for which the servo has seemed to work */
   double angle[HX_LEGS][HX_JOINTS];   /* rad, measured at the last step */
+  double speed[HX_LEGS][HX_JOINTS];   /* rad/s, in the period before it */
   int begun;                          /* there was one */
   int faulty[HX_LEGS][HX_JOINTS];     /* the servo does not work */
   int locked[HX_LEGS][HX_JOINTS];     /* its joint did not move when this was found */
 } hxHealth;
 
-static const double strange_share = 0.5; /* 1, of the largest torque, that nothing explains */
-static const double strange_time = 0.06; /* s, in one direction: the servo does not work */
-static const double still_speed = 0.05;  /* rad/s, of a joint that does not move */
-static const double sound_share = 0.35;  /* 1, of the largest torque: the servo seems to work */
+static const double strange_share = 0.5;  /* 1, of the largest torque, that nothing explains */
+static const double strange_time = 0.035; /* s, in one direction: the servo does not work */
+/* s, largest damping over stiffness, besides the drag of the model */
+static const double damping_time = 0.02;
+static const double still_speed = 0.05; /* rad/s, of a joint that does not move */
+static const double sound_share = 0.35; /* 1, of the largest torque: the servo seems to work */
 /* s, for which a servo must seem to work: longer than a period of the trial */
 static const double proof_time = 1.2;
 
@@ -33,21 +37,28 @@ static inline void hx_health_compile(const hxControllerDefinition *definition,
                                      hxHealthModel *model) {
   model->stiffness = definition->servo.kp;
   model->drag = definition->servo.drag;
+  model->rotor = definition->servo.rotor_inertia;
   model->most = definition->gains.limits.torque;
   model->period = definition->period;
 }
 
-/* Returns the torque of a servo's model that no load explains, over the largest one. before: angle
- * a period ago [rad]; load: torque that the joint needs [N m]. */
-static inline double unexplained(const hxHealthModel *model, double speed_max, double before,
-                                 double angle, double angle_ref, double speed_ref,
-                                 double torque_ref, double load) {
-  const double speed = (angle - before) / model->period, pace = speed / speed_max,
-               reached = angle_ref + model->period * speed_ref,
-               torque = model->stiffness * (reached - angle) + torque_ref - model->drag * speed,
-               low = -model->most * hx_clamp(1.0 + pace, 0.0, 1.0),
-               high = model->most * hx_clamp(1.0 - pace, 0.0, 1.0);
-  return (hx_clamp(torque, low, high) - load) / model->most;
+/* Returns the torque of a servo's model that nothing explains, over the largest one. speed_before:
+ * of the joint a period ago, speed: now [rad/s]; error: of the angle [rad]; load: torque that the
+ * joint needs [N m]. */
+static inline double unexplained(const hxHealthModel *model, double speed_max, double speed_before,
+                                 double speed, double speed_ref, double error, double torque_ref,
+                                 double load) {
+  const double pace = speed / speed_max, low = -model->most * hx_clamp(1.0 + pace, 0.0, 1.0),
+               high = model->most * hx_clamp(1.0 - pace, 0.0, 1.0),
+               torque = model->stiffness * error + torque_ref - model->drag * speed,
+               damping = damping_time * model->stiffness, slowed = torque - damping * speed,
+               followed = torque + damping * (speed_ref - speed),
+               weakest = hx_smaller(torque, hx_smaller(slowed, followed)),
+               strongest = hx_larger(torque, hx_larger(slowed, followed)),
+               spin = model->rotor / model->period * (speed - speed_before),
+               least = hx_clamp(weakest, low, high) - load - hx_larger(spin, 0.0),
+               most = hx_clamp(strongest, low, high) - load - hx_smaller(spin, 0.0);
+  return (hx_larger(least, 0.0) + hx_smaller(most, 0.0)) / model->most;
 }
 
 /* Judges a servo whose unexplained torque is `excess`, over the largest one. rests: its joint has
@@ -75,13 +86,17 @@ static inline void hx_health_step(const hxHealthModel *model, const hxLegSolver 
     double load[HX_JOINTS];
     hx_leg_solver_load_torques(&leg[k], angle[k], force[k], load);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      const double now = angle[k][joint], before = health->begun ? health->angle[k][joint] : now;
-      const double excess =
-          unexplained(model, leg[k].speed_max, before, now, command->angle_ref[k][joint],
-                      command->speed_ref[k][joint], command->torque_ref[k][joint], load[joint]);
+      const double now = angle[k][joint], before = health->begun ? health->angle[k][joint] : now,
+                   speed = (now - before) / model->period, fastest = leg[k].speed_max,
+                   speed_ref = command->speed_ref[k][joint],
+                   reached = command->angle_ref[k][joint] +
+                             model->period * hx_clamp(speed_ref, -fastest, fastest),
+                   excess = unexplained(model, fastest, health->speed[k][joint], speed, speed_ref,
+                                        reached - now, command->torque_ref[k][joint], load[joint]);
       judge(model->period, excess, fabs(now - before) < still_speed * model->period, k, joint,
             health);
       health->angle[k][joint] = now;
+      health->speed[k][joint] = speed;
     }
   }
   health->begun = 1;
