@@ -257,8 +257,8 @@ class Motion:
 
 
 def settled_motion(robot: Robot, gait: Gait, command: BodyCommand) -> Motion:
-    """Returns what a settled walk under a command needs of joints of any speed, which slow no body
-    down (C59).
+    """Returns what a settled walk under a command needs of the joints, if no limit of their speed
+    slows the body (C59). A speed above the limit counts as the limit.
     """
     period = gait.period / STEPS
     free = replace(robot, servo=replace(robot.servo, speed_max=UNLIMITED))
@@ -272,4 +272,4 @@ def settled_motion(robot: Robot, gait: Gait, command: BodyCommand) -> Motion:
         if step >= 2 * STEPS:
             largest = max(largest, float(np.abs(speed).max()))
             cut = cut or bool(shown.unreachable.any())
-    return Motion(largest, cut)
+    return Motion(min(largest, robot.servo.speed_max), cut)
