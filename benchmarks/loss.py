@@ -39,7 +39,7 @@ PAIRS = [  # no neighbours on one side
     for a, b in combinations(range(len(LEG_NAMES)), 2)
     if b - a > 1 or (a, b) == (2, 3)
 ]
-LOSSES = {
+LOSSES: dict[str, tuple[str, Sequence[tuple[tuple[str, str], ...]]]] = {
     "a servo limp": ("limp", SERVOS),
     "a servo locked": ("locked", SERVOS),
     "a leg": ("limp", [((leg, WHOLE_LEG),) for leg in LEG_NAMES]),

@@ -73,7 +73,8 @@ def divided(logs: Sequence[BenchLog]) -> dict[str, list[Split]]:
     if logs[0].motor == "xl330":
         return {"gains held out in turn": splits(logs, "gain")}
     masses, gains = SEEN
-    own, others = [], []
+    own: list[BenchLog] = []
+    others: list[BenchLog] = []
     for log in logs:
         (own if log.mass in masses and log.register in gains else others).append(log)
     runs = {run(log): log for log in reversed(own)}  # the first of the repetitions

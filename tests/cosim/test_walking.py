@@ -175,7 +175,7 @@ def unreachable(speed: float) -> tuple[bool, bool]:
     """Whether a standing foot, and any foot, is out of reach from 2 s to 6 s of a tripod walk."""
     period, measurement = 0.005, Measurement()
     controller = Controller(ROBOT, period=period, gait=make_gait(ROBOT, "tripod"))
-    controller.plan.aim = controller.plan.ramp.aim  # type: ignore[method-assign]  # not slowed
+    controller.plan.aim = controller.plan.ramp.aim  # type: ignore[assignment, method-assign]
     shown, standing, anyone = controller.diagnostics, False, False
     for k in range(1200):
         controller.step(k * period, BodyCommand(vx=speed), measurement)
