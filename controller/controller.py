@@ -128,9 +128,8 @@ class Controller(Stateful):
         """Takes legs that are lost out of service, before the present step is planned (C57)."""
         health, plan = self.health, self.plan
         force = sense(measurement, LEVEL)
-        # a foot that its leg lifts bears no load: a stuck sensor must not make the servos strange
-        force[plan.paths.clock.swinging & (plan.now.feet.rise > 0.0)] = 0.0
-        health.step(measurement.angle, force, self._out)
+        lifted = plan.paths.clock.swinging & (plan.now.feet.rise > 0.0)
+        health.step(measurement.angle, force, self._out, lifted)
         if plan.lose(health.lost, self._out):
             self._change()
 

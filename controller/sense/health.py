@@ -18,6 +18,7 @@ from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, clamp
 from hexapod_cosim.controller.signals import JointCommand
+from hexapod_cosim.controller.walk.gait_clock import NO_LEG
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
 
@@ -66,7 +67,9 @@ class Health(Stateful):
         """Returns the legs (6,) of which some servo does not work."""
         return np.asarray(self.faulty.any(axis=1))
 
-    def _unexplained(self, angle: Array, force: Array, command: JointCommand) -> Array:
+    def _unexplained(
+        self, angle: Array, force: Array, command: JointCommand, lifted: Mask
+    ) -> Array:
         """Returns the torques (6, 3) of the servos' model that nothing explains [N m]."""
         before = angle if self.angle is None else self.angle
         speed = (angle - before) / self.period
@@ -78,22 +81,28 @@ class Health(Stateful):
         torque = self.stiffness * (reached - angle) + command.torque_ref - self.drag * speed
         damping, nothing = DAMPING_TIME * self.stiffness, np.zeros((LEGS, 3))
         added = np.array([nothing, -damping * speed, damping * (command.speed_ref - speed)])
-        torques = clamp(torque + added, low, high) - self.legs.load_torques(angle, force)
+        torques = clamp(torque + added, low, high)
+        needed = self.legs.load_torques(angle, force)
+        free = np.where(lifted[:, None], 0.0, needed)
         spin = self.rotor / self.period * (speed - self.speed)
         self.speed = speed
-        least = torques.min(axis=0) - np.maximum(spin, 0.0)
-        most = torques.max(axis=0) - np.minimum(spin, 0.0)
+        least = torques.min(axis=0) - np.maximum(needed, free) - np.maximum(spin, 0.0)
+        most = torques.max(axis=0) - np.minimum(needed, free) - np.minimum(spin, 0.0)
         return np.asarray(np.maximum(least, 0.0) + np.minimum(most, 0.0))
 
-    def step(self, angle: Array, force: Array, command: JointCommand) -> None:
+    def step(
+        self, angle: Array, force: Array, command: JointCommand, lifted: Mask = NO_LEG
+    ) -> None:
         """Judges the servos by a period under a command.
 
         Args:
             angle: (6, 3) measured at its end [rad].
             force: (6, 3) of the ground on the feet, torso axes [N].
             command: to the servos.
+            lifted: (6,) feet that their legs lift. They bear none to all of the force: a stuck
+                sensor, or a stone in the way of the leg.
         """
-        excess = self._unexplained(angle, force, command) / self.most
+        excess = self._unexplained(angle, force, command, lifted) / self.most
         size, before = np.abs(excess), angle if self.angle is None else self.angle
         rests = np.abs(angle - before) < STILL_SPEED * self.period
         self.still = np.where(rests, self.still + self.period, 0.0)

@@ -31,13 +31,15 @@ def steps_until_faulty(
     force: float = 0.0,
     drift: float = 0.0,
     speed_ref: float | None = None,
+    lifted: Mask | None = None,
     most: int = 100,
     robot: Robot = ROBOT,
 ) -> int:
     """Returns the steps until the femur of LF is found faulty, `most` if it is not.
 
     offset: of its command from its angle [rad]; force: on its foot, upwards [N]; drift: of angle
-    and command [rad/s]; speed_ref: commanded [rad/s], by default none.
+    and command [rad/s]; speed_ref: commanded [rad/s], by default none; lifted: feet that their legs
+    lift, by default none.
     """
     health = Health(robot, make_gains(robot), legs=LegSolver(robot), period=H)
     command, forces, angle = JointCommand(), np.zeros((LEGS, 3)), robot.stance.copy()
@@ -49,7 +51,7 @@ def steps_until_faulty(
         if speed_ref is not None:
             command.speed_ref[LF, 1] = speed_ref
             command.angle_ref[LF, 1] -= speed_ref * H
-        health.step(angle, forces, command)
+        health.step(angle, forces, command, mask() if lifted is None else lifted)
         if health.faulty.any():
             assert np.argwhere(health.faulty).tolist() == [[LF, 1]]
             return step + 1
@@ -74,6 +76,14 @@ def test_a_load_explains_a_torque() -> None:
     assert lever == pytest.approx(-0.12, abs=1e-9)  # m    the foot's distance from its joint
     assert steps_until_faulty(-0.10, force=30.0) == 100
     assert steps_until_faulty(0.10, force=30.0) < 100
+
+
+def test_a_foot_that_its_leg_lifts_bears_none_to_all_of_the_measured_force() -> None:
+    """A stuck sensor of 30 N asks 3.6 N m of the femur; a stone in the way bears its force."""
+    assert steps_until_faulty(0.0, force=30.0) < 100
+    assert steps_until_faulty(0.0, force=30.0, lifted=mask(LF)) == 100
+    assert steps_until_faulty(-0.10, force=30.0, lifted=mask(LF)) == 100
+    assert steps_until_faulty(0.10, force=30.0, lifted=mask(LF)) < 100
 
 
 def test_damping_by_a_commanded_speed_explains_a_torque() -> None:

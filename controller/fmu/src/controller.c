@@ -117,16 +117,15 @@ static void watch(const hxControllerModel *model, const hxControllerInput *input
                   hxControllerState *state) {
   hxPosture level;
   double force[HX_LEGS][3];
+  int lifted[HX_LEGS];
   memset(&level, 0, sizeof level);
   level.level = 1;
   hx_sense(input, &level, force);
-  /* a foot that its leg lifts bears no load: a stuck sensor must not make the servos strange */
   const hxPlannedStep *now = hx_walk_plan_step(&state->plan, 0);
   for (int k = 0; k < HX_LEGS; ++k)
-    if (state->plan.paths.clock.swinging[k] && now->feet.rise[k] > 0.0)
-      memset(force[k], 0, sizeof force[k]);
+    lifted[k] = state->plan.paths.clock.swinging[k] && now->feet.rise[k] > 0.0;
   hx_health_step(&model->health, model->plan.planner.leg, input->angle, (const double (*)[3])force,
-                 &state->output, &state->health);
+                 &state->output, lifted, &state->health);
   if (!hx_walk_plan_lose(&model->plan, &state->health, &state->output, &state->plan)) return;
   state->regait = 1;
   state->changing = state->back = 0;

@@ -44,10 +44,10 @@ static inline void hx_health_compile(const hxControllerDefinition *definition,
 
 /* Returns the torque of a servo's model that nothing explains, over the largest one. speed_before:
  * of the joint a period ago, speed: now [rad/s]; error: of the angle [rad]; load: torque that the
- * joint needs [N m]. */
+ * joint needs with the measured force on the foot, free: with the least force on it [N m]. */
 static inline double unexplained(const hxHealthModel *model, double speed_max, double speed_before,
                                  double speed, double speed_ref, double error, double torque_ref,
-                                 double load) {
+                                 double load, double free) {
   const double pace = speed / speed_max, low = -model->most * hx_clamp(1.0 + pace, 0.0, 1.0),
                high = model->most * hx_clamp(1.0 - pace, 0.0, 1.0),
                torque = model->stiffness * error + torque_ref - model->drag * speed,
@@ -56,8 +56,9 @@ static inline double unexplained(const hxHealthModel *model, double speed_max, d
                weakest = hx_smaller(torque, hx_smaller(slowed, followed)),
                strongest = hx_larger(torque, hx_larger(slowed, followed)),
                spin = model->rotor / model->period * (speed - speed_before),
-               least = hx_clamp(weakest, low, high) - load - hx_larger(spin, 0.0),
-               most = hx_clamp(strongest, low, high) - load - hx_smaller(spin, 0.0);
+               least = hx_clamp(weakest, low, high) - hx_larger(load, free) - hx_larger(spin, 0.0),
+               most =
+                   hx_clamp(strongest, low, high) - hx_smaller(load, free) - hx_smaller(spin, 0.0);
   return (hx_larger(least, 0.0) + hx_smaller(most, 0.0)) / model->most;
 }
 
@@ -77,11 +78,12 @@ static inline void judge(double period, double excess, int rests, int leg, int j
 }
 
 /* Judges the servos by a period under a command. angle: measured at its end [rad]; force: of the
- * ground on the feet, torso axes [N]. */
+ * ground on the feet, torso axes [N]; lifted: feet that their legs lift, which bear none to all of
+ * the force: a stuck sensor, or a stone in the way of the leg. */
 static inline void hx_health_step(const hxHealthModel *model, const hxLegSolver leg[HX_LEGS],
                                   const double angle[HX_LEGS][HX_JOINTS],
                                   const double force[HX_LEGS][3], const hxControllerOutput *command,
-                                  hxHealth *health) {
+                                  const int lifted[HX_LEGS], hxHealth *health) {
   for (int k = 0; k < HX_LEGS; ++k) {
     double load[HX_JOINTS];
     hx_leg_solver_load_torques(&leg[k], angle[k], force[k], load);
@@ -92,7 +94,8 @@ static inline void hx_health_step(const hxHealthModel *model, const hxLegSolver 
                    reached = command->angle_ref[k][joint] +
                              model->period * hx_clamp(speed_ref, -fastest, fastest),
                    excess = unexplained(model, fastest, health->speed[k][joint], speed, speed_ref,
-                                        reached - now, command->torque_ref[k][joint], load[joint]);
+                                        reached - now, command->torque_ref[k][joint], load[joint],
+                                        lifted[k] ? 0.0 : load[joint]);
       judge(model->period, excess, fabs(now - before) < still_speed * model->period, k, joint,
             health);
       health->angle[k][joint] = now;
