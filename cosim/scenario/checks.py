@@ -128,7 +128,7 @@ def _check_tunings(scenario: Scenario, interface: Interface) -> None:
             raise ScenarioError(
                 "an event on a fixed parameter",
                 got=event.parameter,
-                expected="a tunable one: masses, inertias, gravity, contact, friction, servos",
+                expected="a tunable one: masses, inertias, gravity, contact, friction, servo gains",
                 fix="set it from the start, in [parameters]",
                 where=where,
             )

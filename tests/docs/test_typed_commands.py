@@ -188,7 +188,9 @@ SAYS = {
     "06_tunable.py": ["servo.kp 40 -> 69.6 N m/rad", "energy audit"],
     "07_casadi.py": [
         "gradient    -3.72",
+        "e-04 -6.82",
         "differences -3.72",
+        "e-04 -6.84",
         "cost 0.001857, simulated 0.001857",
         # a package of 280 MB, which `make test-importers` installs
         FOUND if find_spec("casadi") else "without casadi nothing is tuned",

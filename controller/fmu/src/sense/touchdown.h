@@ -21,7 +21,7 @@ static const double hold_limit = 0.030;     /* m, upwards: the largest step heig
 /* s, delay after the planned touch-down that is tolerated */
 static const double grace = 0.040;
 /* s, of the gait clock, in which a foot that it waits for begins to move down */
-static const double patience = 0.060;
+static const double patience = 0.020;
 static const double return_time = 0.060; /* s, in which an offset decays in the swing */
 static const double negligible = 1e-5;   /* m, a smaller offset is set to 0 */
 
