@@ -73,12 +73,15 @@ def test_an_abandoned_batch_is_freed_with_its_threads() -> None:
     before = set(threading.enumerate())  # some of which may end meanwhile
     batch = Batch(EnvSettings(), 2, threads=3)
     batch.reset(seeds=(1, 2))
-    assert len(set(threading.enumerate()) - before) == 2
+    own = set(threading.enumerate()) - before
+    assert 1 <= len(own) <= 2  # the pool starts no thread while one of its own is idle
     gone = weakref.ref(batch)
     del batch
     gc.collect()
     assert gone() is None
-    assert set(threading.enumerate()) <= before
+    for thread in own:
+        thread.join(timeout=60.0)
+        assert not thread.is_alive()
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the system has no fork")
