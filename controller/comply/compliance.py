@@ -143,7 +143,8 @@ class Compliance(Stateful):
         known = float(np.minimum(force[:, 2], most)[self.doubted & ~high].sum())
         total = np.where(self.doubted, reported, reported + known)
         doubted = self.watch.look(self.detector.touching, total, plan.standing | plan.awaited, high)
-        doubted = doubted | (blind := np.count_nonzero(doubted) >= TRIPOD_LEGS)
+        blind = np.count_nonzero(doubted) >= TRIPOD_LEGS
+        doubted = doubted | blind
         fresh = doubted & ~self.doubted
         if fresh.any():
             self.scale, self.lean, self.burden.heft = self.sure
@@ -188,7 +189,8 @@ class Compliance(Stateful):
         it is 0.
         """
         planned = np.where(self.touching, self.scale * plan.shares.squeeze, 0.0)
-        if (whole := float(square(planned).sum())) <= LOAD_FLOOR:
+        whole = float(square(planned).sum())
+        if whole <= LOAD_FLOOR:
             return 0.0
         return min(max(-float(along(planned, deviation).sum()) / whole, 0.0), 1.0)
 

@@ -116,9 +116,10 @@ def read_table(component: Component) -> dict[str, Any]:
     for causality in CAUSALITIES:
         entries = table.get(causality, [])
         if any("record" in entry for entry in entries):
-            from hexapod_cosim.cosim.interface.gain_rows import rows_of_records  # noqa: PLC0415  slow to import
+            # imported only here because it is slow to import
+            from hexapod_cosim.cosim.interface import gain_rows  # noqa: PLC0415
 
-            entries = rows_of_records(entries)
+            entries = gain_rows.rows_of_records(entries)
         table[causality] = [with_defaults(entry, causality, table["unit"]) for entry in entries]
     return table
 

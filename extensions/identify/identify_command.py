@@ -96,10 +96,9 @@ def identify(
             progress=(lambda _text: None) if json else _show_step,
         )
         folder.begin()
-        share = held_out if held_out != HELD_OUT else None
-        command = command_line(
-            "identify", *logs, robot=robot, find=find, friction=friction, held_out=share
-        )
+        share = None if held_out == HELD_OUT else held_out
+        options = {"robot": robot, "find": find, "friction": friction, "held_out": share}
+        command = command_line("identify", *logs, **options)
         written = results.write_identified(found, robot, folder.path, command=command)
     for text in results.warnings(found):
         warn(text.removesuffix("."))

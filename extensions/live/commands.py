@@ -82,19 +82,20 @@ def live(
         refuse_unused(context, UNUSED, written="the page without a server", fix=fix)
         _write_page(page, json=json)
         return
-    from hexapod_cosim.extensions.live.server import LiveServer  # noqa: PLC0415  slow to import
-    from hexapod_cosim.extensions.live.settings import Choices, control_texts, live_scenario  # noqa: PLC0415
+    # imported only here because they are slow to import
+    from hexapod_cosim.extensions.live import settings as live_settings  # noqa: PLC0415
+    from hexapod_cosim.extensions.live.server import LiveServer  # noqa: PLC0415
 
     plan = load_scenario(scenario, overrides=settings or [])
     given = parse_controls(control or [plan.control], where="--control")
     check_control(plan, given)
     plan = replace(plan, control=given[0].text)
-    found, refusal = _gains_of(live_scenario(plan), given_gains(gains))
+    found, refusal = _gains_of(live_settings.live_scenario(plan), given_gains(gains))
     able = CONTROLS if found is not None else ("kinematic",)
-    texts = {one.label: one.text for one in given} | control_texts(plan, able)
+    texts = {one.label: one.text for one in given} | live_settings.control_texts(plan, able)
     refused = {name: refusal for name in CONTROLS if name not in able}
     with waiting("starting the robot"):
-        server = LiveServer(Choices(plan, texts, refused), found, port=port)
+        server = LiveServer(live_settings.Choices(plan, texts, refused), found, port=port)
     with suppress(KeyboardInterrupt):  # the server may have taken the signal itself
         server.run(lambda url: _announce(url, browser=browser, json=json))
     if not json:

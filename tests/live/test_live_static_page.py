@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,25 @@ def page(browser: Any, written: Path) -> Any:
     return opened(browser, written)
 
 
+@contextmanager
+def walking(page: Any) -> Iterator[None]:
+    """Holds the key W; before and after it the command is 0, so that no frame of it is left."""
+    page.wait_for_function(f"{FRAME}.command[0] === 0")
+    page.keyboard.down("w")
+    page.wait_for_function(f"{FRAME}.command[0] > 0")
+    yield
+    page.keyboard.up("w")
+    page.wait_for_function(f"{FRAME}.command[0] === 0")
+
+
+def watch_slowest(page: Any) -> None:
+    """Keeps the least commanded speed [m/s] of the frames from now on in window.slowest."""
+    page.evaluate(
+        "window.slowest = 1; window.hexapod.link.on('frame', (frame) => {"
+        "window.slowest = Math.min(window.slowest, frame.command[0]) })"
+    )
+
+
 def problems(page: Any) -> list[str]:
     return [text for text in page.problems if not text.startswith("file:")]
 
@@ -66,46 +86,35 @@ def test_what_has_no_effect_on_the_page_is_refused(
 
 
 def test_the_robot_walks_and_turns_by_keys_without_a_network(page: Any) -> None:
-    page.keyboard.down("w")
-    page.wait_for_function(f"{FRAME}.position[0] > 0.03")
-    page.keyboard.down("a")
-    page.wait_for_function(f"{FRAME}.quaternion[3] > 0.03")
-    page.keyboard.up("a")
-    page.keyboard.up("w")
+    with walking(page):
+        page.wait_for_function(f"{FRAME}.position[0] > 0.03")
+        page.keyboard.down("a")
+        page.wait_for_function(f"{FRAME}.quaternion[3] > 0.03")
+        page.keyboard.up("a")
     assert problems(page) == []
 
 
 def test_the_gait_changes_while_the_robot_walks(page: Any) -> None:
-    page.keyboard.down("w")
-    page.wait_for_function(f"{FRAME}.command[0] > 0")
-    fast = page.evaluate(f"{FRAME}.command[0]")
-    page.evaluate(
-        "window.slowest = 1; window.hexapod.link.on('frame', (frame) => {"
-        "window.slowest = Math.min(window.slowest, frame.command[0]) })"
-    )
-    page.click("#gaits [data-value=ripple]")
-    page.wait_for_selector("#gaits [data-value=ripple][aria-pressed=true]")
-    page.wait_for_function(f"{FRAME}.command[0] > 1.5 * window.slowest")  # each leg has stepped
-    # 0.3 of the ripple's limit of 0.193 m/s, at the speed with which the page begins
-    slowest = page.evaluate("window.slowest")
-    assert 0.0 < slowest < 0.3 * fast
-    page.keyboard.up("w")
+    with walking(page):
+        fast = page.evaluate(f"{FRAME}.command[0]")
+        watch_slowest(page)
+        page.click("#gaits [data-value=ripple]")
+        page.wait_for_selector("#gaits [data-value=ripple][aria-pressed=true]")
+        # each leg has stepped
+        page.wait_for_function(f"{FRAME}.command[0] > 1.5 * window.slowest")
+        # 0.3 of the ripple's limit of 0.193 m/s, at the speed with which the page begins
+        assert 0.0 < page.evaluate("window.slowest") < 0.3 * fast
 
 
 def test_the_control_changes_while_the_robot_walks(page: Any) -> None:
-    page.keyboard.down("w")
-    page.wait_for_function(f"{FRAME}.command[0] > 0")
-    page.evaluate(
-        "window.slowest = 1; window.hexapod.link.on('frame', (frame) => {"
-        "window.slowest = Math.min(window.slowest, frame.command[0]) })"
-    )
-    for control in ("compliant", "paper", "kinematic"):
-        page.click(f"#controls [data-value={control}]")
-        page.wait_for_selector(f"#controls [data-value={control}][aria-pressed=true]")
-        begin = page.evaluate(f"{FRAME}.position[0]")
-        page.wait_for_function(f"{FRAME}.position[0] > {begin} + 0.02")
-    assert page.evaluate("window.slowest") > 0.0  # the command has held all the time
-    page.keyboard.up("w")
+    with walking(page):
+        watch_slowest(page)
+        for control in ("compliant", "paper", "kinematic"):
+            page.click(f"#controls [data-value={control}]")
+            page.wait_for_selector(f"#controls [data-value={control}][aria-pressed=true]")
+            begin = page.evaluate(f"{FRAME}.position[0]")
+            page.wait_for_function(f"{FRAME}.position[0] > {begin} + 0.02")
+        assert page.evaluate("window.slowest") > 0.0  # the command has held all the time
     assert problems(page) == []
 
 
