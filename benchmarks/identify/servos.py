@@ -29,7 +29,7 @@ from hexapod_cosim.extensions.identify.bench.command import BenchReplay, drawn, 
 from hexapod_cosim.extensions.identify.bench.errors import Errors, log_errors
 from hexapod_cosim.extensions.identify.bench.fit import fit_servo
 from hexapod_cosim.extensions.identify.bench.log import BenchLog
-from hexapod_cosim.extensions.identify.bench.pendulum import Bench
+from hexapod_cosim.extensions.identify.bench.pendulum import STEP, Bench
 from hexapod_cosim.extensions.identify.numbers.servo import TERMS
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.records import Servo
@@ -91,19 +91,19 @@ def _motors(path: Path) -> tuple[str, ...]:
     return tuple(named) or ("xl330",)
 
 
-def bam_angle(servo: Servo, bench: Bench, offset: float, delay: float) -> float:
+def bam_angle(servo: Servo, logs: Sequence[BenchLog], offset: float, delay: float) -> float:
     """Returns the mean absolute error [degrees] of the published scheme, from its formulas: torques
     at the begin of a step, friction that stops the joint clipped to the budget, no firmware limits.
     """
-    plain = replace(servo, current_max=0.0)
+    bench, plain = Bench(logs, step=0.25 * STEP), replace(servo, current_max=0.0)
     kp = servo.torque_constant / servo.resistance * servo.voltage * bench.gain
     angle, speed = bench.measured[0] + offset, bench.speed[0].copy()
     total = bench.inertia + servo.rotor_inertia
     errors = [np.zeros(len(angle))]
+    goals = bench.goals(delay)[:, 0] + offset
     for row in range(len(bench.time) - 1):
-        h = (bench.time[row + 1] - bench.time[row]) / (4 * bench.parts)
-        for part in range(4 * bench.parts):
-            goal = bench.goal(bench.time[row] + (part + 0.5) * h - delay)[0] + offset
+        h = (bench.time[row + 1] - bench.time[row]) / bench.parts
+        for goal in goals[row * bench.parts : (row + 1) * bench.parts]:
             wanted = kp * (goal - angle) * bench.voltage[row] / servo.voltage
             motor = motor_torque(plain, speed, wanted) * bench.on[row]
             weight = -bench.weight * np.sin(angle)
@@ -133,20 +133,17 @@ def repeated(motor: str, logs: Sequence[BenchLog]) -> dict[str, str]:
 
 
 def fitted(
-    motor: str, model: str, judged_on: str, parts: Sequence[Split], pool: Executor
-) -> dict[str, str]:
-    """Returns the row of fits of a friction model, each judged on logs that it did not see."""
+    motor: str, models: Sequence[str], judged_on: str, parts: Sequence[Split], pool: Executor
+) -> Iterator[dict[str, str]]:
+    """Yields the rows of fits of friction models, each judged on logs that it did not see."""
     seen, unseen = zip(*parts, strict=True)
     robot = with_start(load_robot("athena"), seen[0])
-    found = pool.map(fitted_and_judged, seen, unseen, repeat(robot), repeat(model))
-    errors = [error for own in found for error in own]
-    mean = Errors.mean(errors)
-    return _row(
-        f"{motor}, {model} fitted",
-        judged_on,
-        len(errors),
-        [mean.angle, mean.speed, mean.duty, mean.torque],
-    )
+    found = list(pool.map(fitted_and_judged, seen, unseen, repeat(robot), repeat(models)))
+    for model in models:
+        errors = [error for own in found for error in own[model]]
+        mean = Errors.mean(errors)
+        numbers = [mean.angle, mean.speed, mean.duty, mean.torque]
+        yield _row(f"{motor}, {model} fitted", judged_on, len(errors), numbers)
 
 
 def _row(servo: str, judged_on: str, logs: int, numbers: Sequence[float]) -> dict[str, str]:
@@ -173,7 +170,7 @@ def compared(
             figure = drawn(BenchReplay(one, fitted.swing(one), servo, errors[k]))
             path = pictures / f"servo-{name}-{word}.png"
             figure.savefig(path, dpi=120, metadata={"Software": None})
-    numbers = [mean.angle, mean.speed, mean.duty, mean.torque, bam_angle(servo, bench, *values)]
+    numbers = [mean.angle, mean.speed, mean.duty, mean.torque, bam_angle(servo, logs, *values)]
     return _row(name, judged_on, len(logs), numbers)
 
 
@@ -194,8 +191,7 @@ def found_rows(
             yield compared(name, judged_on, unseen, pictures if name == "xl330_fitted" else None)
         models = MODELS[motor]
         for judged_on, parts in divisions.items():
-            for model in models:
-                yield fitted(motor, model, judged_on, parts, pool)
+            yield from fitted(motor, models, judged_on, parts, pool)
             models = models[-1:]  # of the further divisions
         if motor != "xl330":
             yield repeated(motor, logs)

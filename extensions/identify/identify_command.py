@@ -37,7 +37,10 @@ Find = Annotated[
     ),
 ]
 HeldOut = Annotated[
-    float, typer.Option("--held-out", metavar="SHARE", help="Part of each log that only judges.")
+    float,
+    typer.Option(
+        "--held-out", min=0.0, max=0.9, metavar="SHARE", help="Part of each log that only judges."
+    ),
 ]
 Friction = Annotated[
     str | None,
@@ -81,7 +84,7 @@ def identify(
     from hexapod_cosim.cosim.run.worker_pool import processor_count  # noqa: PLC0415
     from hexapod_cosim.extensions.identify import identification, results  # noqa: PLC0415
 
-    groups = _checked(find or list(FOUND), held_out)
+    groups = _checked(find or list(FOUND))
     own = load_robot(robot)
     if friction is not None:
         own = with_friction_model(own, friction)
@@ -163,17 +166,9 @@ def _show_step(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def _checked(names: Sequence[str], held_out: float) -> list[str]:
-    """Returns the groups. Raises HexapodError for an unknown one and a share that is none."""
+def _checked(names: Sequence[str]) -> list[str]:
+    """Returns the groups. Raises HexapodError for an unknown one."""
     for name in names:
         if name not in GROUPS:
             raise unknown_name("group of numbers", name, GROUPS, where="--find")
-    if not 0.0 <= held_out <= 0.9:
-        raise HexapodError(
-            "not a share",
-            got=held_out,
-            expected="0 to 0.9",
-            fix="give --held-out 0.25",
-            where="--held-out",
-        )
     return list(names)

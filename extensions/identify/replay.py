@@ -6,10 +6,9 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -24,7 +23,6 @@ from hexapod_cosim.cosim.report.page import render
 from hexapod_cosim.cosim.results.folder import RESULTS, results_folder
 from hexapod_cosim.cosim.results.recordings import write_recording
 from hexapod_cosim.cosim.scenario.records import default_formats
-from hexapod_cosim.cosim.scenario.tables import with_overrides
 from hexapod_cosim.extensions.identify.bench import is_bench_log
 from hexapod_cosim.extensions.identify.experiment import Experiment
 from hexapod_cosim.extensions.identify.log import (
@@ -74,23 +72,20 @@ class Replay:
         return channel_differences(self.columns)
 
 
-def replay(
-    log: Log, robot: Robot, *, fmu: Path | None = None, parameters: Mapping[str, Any] | None = None
-) -> Replay:
+def replay(log: Log, robot: Robot, *, fmu: Path | None = None) -> Replay:
     """Simulates a robot from the log's first row on, with the log's commands.
 
     Args:
         log: commands and the readings to compare.
         robot: the robot that is simulated.
         fmu: its FMU; by default it is exported.
-        parameters: further parameters of the FMU, by name.
 
     Raises HexapodError for a log without readings and where the plant cannot follow the commands.
     """
     log = with_speed_references(log, robot)
     with TemporaryFolder("replay") as folder:
         path = fmu or export_fmu(robot, folder / "robot.fmu", bare=True)
-        with LogPlant(path, parameters) as plant:
+        with LogPlant(path) as plant:
             names = plant.known(log.measured)
             if not names:
                 raise without_readings(log)
@@ -108,16 +103,13 @@ def replay(
     )
 
 
-def write_replay(
-    done: Replay, robot: Robot, folder: Path, *, command: str, settings: Mapping[str, Any]
-) -> list[Path]:
+def write_replay(done: Replay, robot: Robot, folder: Path, *, command: str) -> list[Path]:
     """Writes replay.csv, the simulated rows, the report and run.json; returns the files."""
     facts = {
         "kind": KIND,
         "status": "completed",
         "log": done.log.where,
         "robot": {"name": robot.name, "hash": robot.hash},
-        "settings": dict(settings),
         "command": command,
         "channels": [asdict(one) for one in done.channels],
         "warnings": done.warnings,
@@ -168,12 +160,6 @@ LogFile = Annotated[
         help="A CSV, Parquet or MCAP file with commands and readings, or a servo bench's JSON.",
     ),
 ]
-Parameters = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set", metavar="NAME=VALUE", help="Set a parameter of the FMU (friction.mu=0.5)."
-    ),
-]
 Folder = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/replay."),
@@ -183,7 +169,6 @@ Folder = Annotated[
 def replay_command(
     log: LogFile,
     robot: RobotName = "athena",
-    settings: Parameters = None,
     fmu: FmuFile = None,
     output: Folder = None,
     json: Json = False,
@@ -193,14 +178,13 @@ def replay_command(
     if is_bench_log(log):
         _replay_bench(log, own, output, command_line("replay", log, robot=robot), json)
         return
-    parameters = fmu_parameters(settings or [])
-    command = command_line("replay", log, robot=robot, set=settings, fmu=fmu)
+    command = command_line("replay", log, robot=robot, fmu=fmu)
     recorded = read_log(log, robot=own)
     with results_folder(output or Path("out") / "replay", own=("replay.csv",)) as folder:
         with waiting("replaying the log"):
-            done = replay(recorded, own, fmu=fmu, parameters=parameters)
+            done = replay(recorded, own, fmu=fmu)
         folder.begin()
-        files = write_replay(done, own, folder.path, command=command, settings=parameters)
+        files = write_replay(done, own, folder.path, command=command)
     for text in done.warnings:
         warn(text.removesuffix("."))
     if json:
@@ -225,20 +209,3 @@ def _replay_bench(log: Path, robot: Robot, output: Path | None, command: str, js
         return
     show_table(bench.ERRORS, [bench.error_texts(done.errors)], right=(0, 1, 2, 3))
     show_files(files)
-
-
-def fmu_parameters(settings: Sequence[str]) -> dict[str, Any]:
-    """Returns the parameters of the FMU that --set gives, by name. Raises ScenarioError."""
-    found: dict[str, Any] = {}
-
-    def flatten(table: Mapping[str, Any], stem: str) -> None:
-        for key, value in table.items():
-            if isinstance(value, dict):
-                flatten(value, f"{stem}{key}.")
-            else:
-                found[f"{stem}{key}"] = value
-
-    tables = with_overrides({}, settings)
-    flatten(tables.pop("parameters", {}), "")
-    flatten(tables, "")
-    return found

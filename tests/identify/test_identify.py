@@ -303,7 +303,7 @@ def test_the_command_writes_robot_sensors_and_report(
         (("x.csv", "--friction", "m7"), ("m7", "m6", "--friction")),
         (("x.csv", "--friction", "m4"), ("friction models are those of measured servos",)),
         (("x.bag",), ("not a log", ".mcap")),
-        (("x.csv", "--held-out", "2"), ("not a share", "--held-out")),
+        (("x.csv", "--held-out", "2"), ("less than or equal to 0.9", "--held-out")),
     ],
 )
 def test_misuse_is_refused_and_leaves_nothing(

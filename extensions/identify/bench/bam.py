@@ -1,7 +1,7 @@
 """Reads logs of BAM (github.com/Rhoban/bam): a Dynamixel servo that reports its duty as load.
 
 Within a row the goal reaches the servo 3.0 ms before the row's time; the angle is read 1.4 ms, the
-speed 0.7 ms before it, the voltage 0.7 ms after it.
+(late) speed 0.7 ms before it, the voltage 0.7 ms after it.
 """
 
 from __future__ import annotations
@@ -13,12 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.extensions.identify.bench.log import BenchLog, column
+from hexapod_cosim.extensions.identify.bench.log import SPEED_DELAY, BenchLog, column
 
 FULL_DUTY = 885.0  # of the load
 GAIN = 4096.0 / (2.0 * math.pi) / (256.0 * FULL_DUTY)  # 1/rad for each unit of the register
 SIGNED = 32767.0  # of a 16-bit number
-ANGLE, SPEED, VOLTAGE = -0.0014, -0.0007, 0.0007  # s  from a row's time to its readings
+ANGLE, SPEED, VOLTAGE = (
+    -0.0014,
+    -0.0007 - SPEED_DELAY,
+    0.0007,
+)  # s  from a row's time to its readings
 
 
 def read(path: Path, table: Mapping[str, Any]) -> BenchLog:

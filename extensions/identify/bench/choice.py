@@ -71,11 +71,8 @@ def choose(
     fits = {}
     if len(models) > 1:
         progress(f"{len(models)} models, judged without one {by}")
-        seen, unseen = parts[len(parts) // 2]
-        found = list(
-            pool.map(fitted_and_judged, repeat(seen), repeat(unseen), repeat(robot), models)
-        )
-        fits = {model: Errors.mean(own) for model, own in zip(models, found, strict=True)}
+        found = fitted_and_judged(*parts[len(parts) // 2], robot, models)
+        fits = {model: Errors.mean(own) for model, own in found.items()}
     model = next(
         key
         for key in models
@@ -83,17 +80,21 @@ def choose(
     )
     progress(f"{model}, all logs and {len(parts)} times without one {by}")
     seen_parts, unseen_parts = zip(*parts, strict=True)
-    judgements = pool.map(fitted_and_judged, seen_parts, unseen_parts, repeat(robot), repeat(model))
+    errors = pool.map(fitted_and_judged, seen_parts, unseen_parts, repeat(robot), repeat([model]))
     whole = fit_servo(logs, robot, model)  # here, while the pool judges
     pairs = [
-        pair for own, one in zip(unseen_parts, judgements, strict=True)
-        for pair in zip(own, one, strict=True)
+        pair for own, one in zip(unseen_parts, errors, strict=True)
+        for pair in zip(own, one[model], strict=True)
     ]  # fmt: skip
     return Choice(model=model, fit=whole, held_out=tuple(pairs), models=fits)
 
 
 def fitted_and_judged(
-    seen: Sequence[BenchLog], unseen: Sequence[BenchLog], robot: Robot, model: str
-) -> list[Errors]:
-    """Returns the errors of a fit over each of some logs that it did not see."""
-    return judged(fit_servo(seen, robot, model, seeds=1), unseen)
+    seen: Sequence[BenchLog], unseen: Sequence[BenchLog], robot: Robot, models: Sequence[str]
+) -> dict[str, list[Errors]]:
+    """Returns the errors of fits of models over each of some logs that they did not see."""
+    known: dict[str | None, ServoFit] = {}
+    return {
+        model: judged(fit_servo(seen, robot, model, seeds=1, known=known), unseen)
+        for model in models
+    }

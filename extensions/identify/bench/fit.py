@@ -13,7 +13,7 @@ from hexapod_cosim.extensions.identify.bench.pendulum import Bench, Swing, stack
 from hexapod_cosim.extensions.identify.fitting.covariance import Series, coloured_information
 from hexapod_cosim.extensions.identify.fitting.least_squares import damped_step, huber
 from hexapod_cosim.extensions.identify.numbers import Unknown, section
-from hexapod_cosim.extensions.identify.numbers.servo import FIRST, SERVO, with_friction_model
+from hexapod_cosim.extensions.identify.numbers.servo import SERVO, with_friction_model
 from hexapod_cosim.models import Robot
 
 Array = NDArray[np.float64]
@@ -34,8 +34,8 @@ BENCH = (
     Unknown(key=OFFSET, unit="rad", group="bench", prior=0.03, positive=False),
     Unknown(key=DELAY, unit="s", group="bench", prior=0.01, positive=False, low=0.0),
 )
-SIMPLER = {"m4": "m3", "m5": "m3", "m6": "m3"}  # where the search of these begins,
-FURTHER = 0.1  # with this share of a typical term for those that they add
+# of each model the largest one that it contains, whose fit is another start of its search
+SIMPLER = {"m2": "m1", "m3": "m1", "m4": "m3", "m5": "m4", "m6": "m5"}
 LIMITS = (
     section("servo.current_max", "A", "servo", 0.3),
     section("servo.goal_speed_max", "rad/s", "servo", 0.3),
@@ -112,54 +112,67 @@ class _Problem:
         slopes = self.slopes(z)
         return np.vstack([slopes.reshape(-1, len(z)), np.eye(len(z))])
 
+    def cost(self, z: Array) -> float:
+        """Returns what a search lowers."""
+        return huber(self.residuals(z))
+
+    def place(self, fit: ServoFit) -> Array:
+        """Returns the numbers (numbers,) at which the servo is that of a fit."""
+        own = {row.key: row.read(fit.robot) for row in self.rows} | fit.values
+        return np.array([row.distance(own[row.key], self.before[row.key]) for row in self.rows])
+
+    def starts(self, seeds: int) -> list[Array]:
+        """Returns the start's numbers and others near them."""
+        rng = np.random.default_rng(1)
+        size = len(self.rows)
+        further = [SPREAD * rng.standard_normal(size) for _ in range(seeds - 1)]
+        return [np.clip(z, *self.bounds()) for z in (np.zeros(size), *further)]
+
     def bounds(self) -> tuple[Array, Array]:
         low, high = zip(*(row.bounds(self.before[row.key]) for row in self.rows), strict=True)
         return np.array(low), np.array(high)
 
 
 def fit_servo(
-    logs: Sequence[BenchLog], robot: Robot, model: str | None, *, seeds: int = SEEDS
+    logs: Sequence[BenchLog],
+    robot: Robot,
+    model: str | None,
+    *,
+    seeds: int = SEEDS,
+    known: dict[str | None, ServoFit] | None = None,
 ) -> ServoFit:
-    """Returns the servo that follows bench logs best.
+    """Returns the servo that follows bench logs best, at least as well as with a simpler model.
 
     Args:
         logs: their gains are known.
         robot: whose servo is where the search begins.
         model: friction model, "m1" to "m6"; None: of the bench alone offset and delay are sought.
         seeds: number of starts.
+        known: fits to the same logs from calls before, by model; this one's are added.
 
     Raises HexapodError for an unknown model and a servo without a motor.
     """
-    bench, share = Bench(logs, step=COARSE), FIRST
+    known = {} if known is None else known
+    if model in known:
+        return known[model]
+    start = robot if model is None else with_friction_model(robot, model)
+    rows = BENCH if model is None else unknowns(start)
+    problem, found = _Problem(Bench(logs, step=COARSE), start, rows), []
     if model in SIMPLER:
-        robot = with_friction_model(robot, SIMPLER[model])
-        first = _Problem(bench, robot, unknowns(robot))
-        robot, seeds = first.changed(_values(first.rows, first.before, _best(first, seeds))), 1
-        share = FURTHER
-    if model is not None:
-        robot = with_friction_model(robot, model, share=share)
-    rows = BENCH if model is None else unknowns(robot)
-    z = _best(_Problem(bench, robot, rows), seeds)
-    problem = _Problem(Bench(logs), robot, rows)
-    z = _searched(problem, z, STEPS)
-    return ServoFit(
+        simpler = fit_servo(logs, robot, SIMPLER[model], seeds=seeds, known=known)
+        found.append(problem.place(simpler))
+        found.append(_searched(problem, found[0], SHORT))
+    found += [_searched(problem, z, SHORT) for z in problem.starts(seeds)]
+    problem.bench = Bench(logs)
+    z = _searched(problem, min(found, key=problem.cost), STEPS)
+    known[model] = ServoFit(
         robot=problem.changed(_values(rows, problem.before, z)),
         rows=tuple(rows),
         z=z,
         before=problem.before,
         deviations=np.sqrt(np.diag(_covariance(problem, z))),
     )
-
-
-def _best(problem: _Problem, seeds: int) -> Array:
-    """Returns the best numbers of searches from the start and from others near it."""
-    rng = np.random.default_rng(1)
-    found = []
-    for seed in range(seeds):
-        start = SPREAD * rng.standard_normal(len(problem.rows)) if seed else 0.0
-        z = _searched(problem, np.clip(start, *problem.bounds()), SHORT)
-        found.append((huber(problem.residuals(z)), seed, z))
-    return min(found)[2]
+    return known[model]
 
 
 def _covariance(problem: _Problem, z: Array) -> Array:

@@ -1,4 +1,7 @@
-"""Reads logs of K-Scale (github.com/kscalelabs/sysid): Feetech servos; `torque` is their load."""
+"""Reads logs of K-Scale (github.com/kscalelabs/sysid): Feetech servos; `torque` is their load.
+
+A reading that failed is 0: of the angle -pi, or a step of the encoder above it.
+"""
 
 from __future__ import annotations
 
@@ -7,20 +10,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hexapod_cosim.extensions.identify.bench.log import BenchLog, column
+from hexapod_cosim.extensions.identify.bench.log import SPEED_DELAY, Array, BenchLog, column
 
 # duty for each radian of position error and unit of the gain register, as K-Scale measured it
 GAINS = {"sts3215": 0.164890901, "sts3250": 0.16382926}
 RODS = {0.1: 0.036, 0.15: 0.050}  # kg by length [m], from K-Scale's configurations
 NEGATIVE = 1024.0  # the load's sign bit
 UNITS = 1000.0  # of the load at full duty
+LEAST = -3.139  # rad  an angle below it failed
 
 
 def read(path: Path, table: Mapping[str, Any]) -> BenchLog:
     """Returns the log of a file's table. Raises KeyError and others for a file of another kind."""
     entries, load = table["entries"], np.round(100.0 * column(table["entries"], "torque"))
-    voltage = column(entries, "input_volts")
+    time, on = column(entries, "timestamp"), column(entries, "torque_enable")
+    angle, voltage = column(entries, "position"), column(entries, "input_volts")
+    duty = np.where(load >= NEGATIVE, load - NEGATIVE, -load) / UNITS
     return BenchLog(
         where=str(path),
         motor=table["motor"],
@@ -30,11 +37,17 @@ def read(path: Path, table: Mapping[str, Any]) -> BenchLog:
         rod=table.get("arm_mass", RODS[table["length"]]),
         length=table["length"],
         trajectory=table["trajectory"],
-        time=column(entries, "timestamp"),
+        time=time,
         goal=column(entries, "goal_position"),
-        angle=column(entries, "position"),
-        speed=column(entries, "speed"),
-        duty=np.where(load >= NEGATIVE, load - NEGATIVE, -load) / UNITS,
-        voltage=np.where(voltage > 0.0, voltage, np.median(voltage)),  # 0: a failed reading
-        on=column(entries, "torque_enable"),
+        angle=_without(angle, angle < LEAST),
+        speed=np.interp(time + SPEED_DELAY, time, column(entries, "speed")),
+        duty=_without(duty, (load == 0.0) & (on > 0.0)),
+        voltage=_without(voltage, voltage <= 0.0),
+        on=on,
     )
+
+
+def _without(values: Array, failed: NDArray[np.bool_]) -> Array:
+    """Returns readings (rows,) with those that failed, unless all did, between their neighbours."""
+    rows, good = np.arange(len(values)), ~failed
+    return np.interp(rows, rows[good], values[good]) if good.any() else values

@@ -88,8 +88,8 @@ class Bench:
         servo = replace(servo, kp=gains)
         shape = np.broadcast_shapes(np.shape(servo.kp), np.shape(offset), self.gain.shape)
         shape = (1,) * (2 - len(shape)) + shape
-        rows = len(self.time)
-        parts = self.parts
+        rows, parts = len(self.time), self.parts
+        goals = self.goals(delay) + offset
         angle = np.broadcast_to(self.measured[0] + offset, shape).copy()
         state = _State(angle, np.broadcast_to(self.speed[0], shape).copy(), angle.copy())
         found = Swing(*(np.empty((rows, *shape)) for _ in range(3)))
@@ -99,20 +99,22 @@ class Bench:
             supply = self.voltage[row] / servo.voltage
             found.angle[row], found.speed[row] = state.angle - offset, state.speed
             for part in range(parts if later > row else 0):
-                goal = self.goal(self.time[row] + (part + 0.5) * h - delay) + offset
+                goal = goals[row * parts + part]
                 duty = state.step(servo, self, h, goal, supply, self.on[row])
                 if part == 0:
                     found.duty[row] = duty
         found.duty[-1] = found.duty[-2]
         return found
 
-    def goal(self, time: Array) -> Array:
-        """Returns the goals at times (servos, logs) between rows, or (logs,)."""
-        table = np.atleast_2d(time)
-        found = np.empty(table.shape)
-        for k, log in enumerate(self.logs):
-            found[:, k] = np.interp(table[:, k], log.time, log.goal)
-        return found
+    def goals(self, delay: Array | float) -> Array:
+        """Returns the goals (steps, servos, logs) at the middle of each step, less a delay."""
+        h = np.diff(self.time, axis=0)[:, None] / self.parts
+        middle = (np.arange(self.parts) + 0.5)[:, None] * h
+        time = (self.time[:-1, None] + middle).reshape(-1, 1, len(self.logs)) - delay
+        return np.stack(
+            [np.interp(time[..., k], log.time, log.goal) for k, log in enumerate(self.logs)],
+            axis=-1,
+        )
 
 
 def _table(logs: Sequence[BenchLog], name: str, rows: int) -> Array:

@@ -62,7 +62,7 @@ class Unknown:
     def bounds(self, before: float) -> tuple[float, float]:
         """Returns the limits of z."""
         if self.positive:
-            return -FURTHEST, FURTHEST
+            return -FURTHEST, min(math.log(self.high / before) / self.prior, FURTHEST)
         low, high = (self.low - before) / self.prior, (self.high - before) / self.prior
         return max(low, -FURTHEST), min(high, FURTHEST)
 

@@ -93,7 +93,9 @@ FRICTION = (
         for key in QUADRATIC
     ),
     section("servo.stribeck_speed", "rad/s", "servo", 0.5, applies=_has_term(*STRIBECK)),
-    section("servo.stribeck_exponent", "1", "servo", 0.5, applies=_has_term(*STRIBECK)),
+    section(
+        "servo.stribeck_exponent", "1", "servo", 0.5, high=16.0, applies=_has_term(*STRIBECK)
+    ),
 )  # fmt: skip
 SERVO = (
     section("servo.kp", "N m/rad", "servo", 0.3),
@@ -124,7 +126,7 @@ LEAST = 1e-3  # of a typical term: a smaller one of the file is as none
 APART = 1.1  # between the coefficients of motor and load where the search of M5, M6 begins
 
 
-def with_friction_model(robot: Robot, model: str, *, share: float = FIRST) -> Robot:
+def with_friction_model(robot: Robot, model: str) -> Robot:
     """Returns the robot with the terms of a friction model; other terms are 0.
 
     Terms are the robot file's, and a share of what is typical of servos of its size where it has
@@ -147,7 +149,7 @@ def with_friction_model(robot: Robot, model: str, *, share: float = FIRST) -> Ro
     values: dict[str, Any] = dict.fromkeys(typical, 0.0)
     for key in ("coulomb_friction", "viscous_friction", *TERMS[model]):
         own = getattr(servo, key)
-        values[key] = own if own > LEAST * typical[key] else share * typical[key]
+        values[key] = own if own > LEAST * typical[key] else FIRST * typical[key]
     for motor, external in (LOADS, STRIBECK_LOADS):
         if model in SINGLE:
             values[motor] = values[external] = 0.5 * (values[motor] + values[external])
