@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -81,7 +81,7 @@ class Variable:
     group: str | None
     description: str
 
-    def check(self, value: float, error: type[HexapodError], *, name: str) -> None:
+    def check(self, value: float, error: Callable[..., HexapodError], *, name: str) -> None:
         """Raises the error for a value that is out of range, or not whole where it must be."""
         low, high = (0.0, 1.0) if self.type == "Boolean" else (self.minimum, self.maximum)
         low, high = -math.inf if low is None else low, math.inf if high is None else high
