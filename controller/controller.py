@@ -18,7 +18,6 @@ import numpy as np
 from hexapod_cosim.controller.checks import ControllerError, check_law, check_period
 from hexapod_cosim.controller.comply.compliant import Compliant, sense
 from hexapod_cosim.controller.comply.paper import Paper, Step
-from hexapod_cosim.controller.comply.posture import LEVEL
 from hexapod_cosim.controller.gains import Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plan import WalkPlan
@@ -31,6 +30,7 @@ from hexapod_cosim.controller.walk.fade import Fade
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.gait_clock import NO_LEG
 from hexapod_cosim.controller.walk.kinematics import LegSolver
+from hexapod_cosim.controller.walk.posture import LEVEL
 from hexapod_cosim.models import Robot
 
 ALL_PARTS = Parts()
@@ -135,10 +135,10 @@ class Controller(Stateful):
 
     def _fold(self, measurement: Measurement) -> None:
         """Folds legs out of service away, and takes back one that works again (C58)."""
-        absence = self.plan.absence
+        absence, health = self.plan.absence, self.health
         if not absence.legs.any():
             return
-        there = absence.fold(measurement.angle, self.health, self._out)
+        there = absence.fold(measurement.angle, health.faulty, health.locked, self._out)
         self.diagnostics.unreachable[...] &= ~absence.legs
         if there.any() and self._back is None:
             self._change(int(np.argmax(there)))

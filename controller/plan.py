@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.controller.comply.compliant import Compliant, PresentStep
-from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.gains import Parts
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, cis, rows_of
@@ -29,6 +28,7 @@ from hexapod_cosim.controller.walk.gait_clock import NO_LEG
 from hexapod_cosim.controller.walk.inverse_dynamics import Neighbours
 from hexapod_cosim.controller.walk.kinematics import Feet, LegSolver, Pose
 from hexapod_cosim.controller.walk.pace import Pace
+from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.controller.walk.swing import Twist
 
 

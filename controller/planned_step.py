@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from hexapod_cosim.controller.comply.compliant import Compliant
-from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.comply.sway import Sway
 from hexapod_cosim.controller.gains import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis
@@ -19,6 +18,7 @@ from hexapod_cosim.controller.walk.foot_paths import PlannedFeet
 from hexapod_cosim.controller.walk.gait_clock import GaitClock
 from hexapod_cosim.controller.walk.inverse_dynamics import Masses
 from hexapod_cosim.controller.walk.kinematics import LegSolver, Pose
+from hexapod_cosim.controller.walk.posture import Posture
 
 
 class PlannedStep(NamedTuple):

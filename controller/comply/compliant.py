@@ -22,7 +22,6 @@ import numpy as np
 from hexapod_cosim.controller.comply.compliance import Compliance
 from hexapod_cosim.controller.comply.load_plan import LoadPlan, plan_load
 from hexapod_cosim.controller.comply.planned_squeeze import PlannedSqueeze
-from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.comply.support import Support
 from hexapod_cosim.controller.gains import Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
@@ -34,6 +33,7 @@ from hexapod_cosim.controller.walk.gait_clock import GaitClock
 from hexapod_cosim.controller.walk.hold import Hold, Sight
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.controller.walk.kinematics import LegSolver
+from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.controller.walk.swing import Twist
 from hexapod_cosim.models import Robot
 

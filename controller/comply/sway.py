@@ -14,11 +14,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.plane import LEGS, along
 from hexapod_cosim.controller.walk.foot_paths import PlannedFeet
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Masses
 from hexapod_cosim.controller.walk.kinematics import LegSolver
+from hexapod_cosim.controller.walk.posture import Posture
 
 REACH = 1e-3  # m    by which all feet are moved to find the mass that moves with them
 

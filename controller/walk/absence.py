@@ -13,7 +13,6 @@ import numpy as np
 
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, clamp
-from hexapod_cosim.controller.sense.health import Health
 from hexapod_cosim.controller.signals import JointCommand
 from hexapod_cosim.controller.walk.gait import PATTERNS, Gait
 from hexapod_cosim.controller.walk.kinematics import LegSolver
@@ -149,17 +148,17 @@ class Absence(Stateful):
         left = 0.0 if x >= 1.0 else 1.0 - x * x * (3.0 - 2.0 * x)
         return np.where(self.legs, np.where(self.gone, 0.0, left), 1.0)
 
-    def fold(self, angle: Array, health: Health, out: JointCommand) -> Mask:
+    def fold(self, angle: Array, faulty: Mask, locked: Mask, out: JointCommand) -> Mask:
         """Replaces the commands of the legs out of service, in place.
 
         Legs without a faulty servo return to the plan. Returns the legs (6,) that are there.
 
-        angle: (6, 3) measured [rad]; health: of the servos.
+        angle: (6, 3) measured [rad]; faulty, locked: (6, 3) servos.
         """
-        faulty, lost = health.faulty, health.lost
+        lost = faulty.any(axis=1)
         swing = TRIAL_SWING * math.sin(math.tau * self.trial * self.period / TRIAL_TIME)
         self.trial += 1
-        target = folded(self.solver, faulty, health.locked)
+        target = folded(self.solver, faulty, locked)
         moved = (np.abs(angle - self.place) > LIMP_WAY) & self.legs[:, None]
         self.place = np.where(moved, angle, self.place)
         target = np.where(faulty, self.place + swing, target)

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, across, cis
 from hexapod_cosim.controller.walk.kinematics import LegSolver, Pose
+from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.actuator import GEAR_SPEED
 

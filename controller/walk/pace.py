@@ -12,13 +12,13 @@ from dataclasses import astuple, replace
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import Array, Mask, Plane, cis
 from hexapod_cosim.controller.walk.command import BodyCommand
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.gait_clock import NO_LEG
 from hexapod_cosim.controller.walk.kinematics import Feet, LegSolver
+from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.controller.walk.swing import Twist, blend, hop, travel
 
 # 1    joint speed that a command may need, over the largest one or over that of steps on the spot:

@@ -27,12 +27,12 @@ from hexapod_cosim.controller import (
     make_gait,
 )
 from hexapod_cosim.controller.comply.planned_squeeze import PlannedSqueeze
-from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.comply.support import Support
 from hexapod_cosim.controller.gains import SupportGains
 from hexapod_cosim.controller.plane import cis
 from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Neighbours
+from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.models import ReachError, Robot
 from hexapod_cosim.models.records import Array
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Controller, Gait
-from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.plane import LEGS, cis
 from hexapod_cosim.controller.planned_step import place_legs
+from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.controller.walk.swing import Twist, travel
 from hexapod_cosim.cosim.scenario.records import Command
 from hexapod_cosim.models import Robot, ScenarioError

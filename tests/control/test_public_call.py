@@ -5,6 +5,8 @@ controller new writes.
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from inspect import getsourcelines
 from pathlib import Path
 from typing import Any
@@ -142,9 +144,16 @@ def test_it_writes_a_controller_its_test_and_a_line(call: Call, tmp_path: Path) 
     assert f"hexapod simulate walk_flat --control {tmp_path / 'my_walk.py'}:MyWalk" in out
     assert (tmp_path / "README.md").read_text().startswith("# Mine\n- `my_walk.py`: ")
     test = (tmp_path / "test_my_walk.py").read_text()
-    compile(test, "test_my_walk.py", "exec")
     assert "@" not in test
     assert "class MyWalk:" in (tmp_path / "my_walk.py").read_text()
+
+
+def test_the_test_that_it_writes_passes(call: Call, tmp_path: Path, plant_build: Path) -> None:
+    assert call("controller", "new", "my_walk", "-o", tmp_path)[0] == 0
+    run = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_my_walk.py"]
+    done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "2 passed" in done.stdout
 
 
 def test_it_overwrites_nothing(call: Call, tmp_path: Path) -> None:

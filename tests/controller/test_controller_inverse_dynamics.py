@@ -13,8 +13,8 @@ from states import changed, with_links
 from twin_motion import HIGH, Motion, Z, twin_needs, velocities
 
 from hexapod_cosim.controller import LegSolver
-from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics, Neighbours
+from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.actuator import GEAR_SPEED
 from hexapod_cosim.models.dynamics import masses

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.controller import LegSolver
-from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.walk.kinematics import Feet, Joints
+from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.models import ReachError, Robot, RobotError, foot_positions, load_robot
 from hexapod_cosim.models.kinematics import axis_rotation
 

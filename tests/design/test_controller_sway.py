@@ -17,11 +17,11 @@ from hexapod_cosim.controller import (
     Parts,
     make_gait,
 )
-from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.comply.support import Support
 from hexapod_cosim.controller.comply.sway import Sway
 from hexapod_cosim.controller.sense.load_adaptation import LoadAdaptation
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Neighbours
+from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.models import load_robot
 
 ROBOTS = ["athena", "phantomx_mk4"]

@@ -22,7 +22,7 @@ SEES = {
     "cosim": {"models", "controller", "cosim"},
     "extensions": {"models", "controller", "cosim", "extensions"},
 }
-# what each room of cosim may import
+# what each room of cosim and of controller may import, besides the files beside the rooms
 LOW = ["common", "interface", "scenario", "master"]
 RUNNING = [*LOW, "control", "export", "logs", "results", "design"]
 ROOMS = {
@@ -37,6 +37,12 @@ ROOMS = {
     "design": [*LOW, "export"],
     "report": [*LOW, "export", "results"],
     "run": RUNNING,
+}
+CONTROL_ROOMS = {
+    "walk": [],
+    "sense": ["walk"],
+    "comply": ["walk", "sense"],
+    "design": ["walk", "sense", "comply"],
 }
 # the components of FMUs; an extension may have been deleted
 POLICY = "extensions/gym/policy_fmu"
@@ -88,21 +94,23 @@ def test_a_folder_imports_only_what_lies_below_it(folder: str) -> None:
                 assert parts[1] in SEES[folder], f"{path.relative_to(ROOT)} imports {name}"
 
 
-def test_a_room_imports_only_the_rooms_below_it() -> None:
+@pytest.mark.parametrize(("folder", "rooms"), [("cosim", ROOMS), ("controller", CONTROL_ROOMS)])
+def test_a_room_imports_only_the_rooms_below_it(folder: str, rooms: dict[str, list[str]]) -> None:
     seen = set()
-    for path in python_files("cosim"):
-        parts = path.relative_to(ROOT / "cosim").with_suffix("").parts
+    for path in python_files(folder):
+        parts = path.relative_to(ROOT / folder).with_suffix("").parts
         if len(parts) == 1 or parts[0] == "cli" or parts[-1] == "__init__":
             continue
         room = parts[0]
         seen.add(room)
         for name in imports(path):
-            if name.startswith(f"{PACKAGE}.cosim."):
-                other = name.split(".")[2]
-                assert other == room or other in ROOMS[room], (
+            package, _, inner = name.partition(f"{PACKAGE}.{folder}.")
+            other = inner.split(".")[0]
+            if not package and (ROOT / folder / other).is_dir():
+                assert other == room or other in rooms[room], (
                     f"{path.relative_to(ROOT)} imports {name}"
                 )
-    assert seen == set(ROOMS)
+    assert seen == set(rooms)
 
 
 def test_an_extension_imports_no_other() -> None:

@@ -117,7 +117,7 @@ static void watch(const hxControllerModel *model, const hxControllerInput *input
                   hxControllerState *state) {
   hxPosture level;
   double force[HX_LEGS][3];
-  int lifted[HX_LEGS];
+  int lifted[HX_LEGS], lost[HX_LEGS];
   memset(&level, 0, sizeof level);
   level.level = 1;
   hx_sense(input, &level, force);
@@ -126,7 +126,8 @@ static void watch(const hxControllerModel *model, const hxControllerInput *input
     lifted[k] = state->plan.paths.clock.swinging[k] && now->feet.rise[k] > 0.0;
   hx_health_step(&model->health, model->plan.planner.leg, input->angle, (const double (*)[3])force,
                  &state->output, lifted, &state->health);
-  if (!hx_walk_plan_lose(&model->plan, &state->health, &state->output, &state->plan)) return;
+  for (int k = 0; k < HX_LEGS; ++k) lost[k] = hx_health_lost(&state->health, k);
+  if (!hx_walk_plan_lose(&model->plan, lost, &state->output, &state->plan)) return;
   state->regait = 1;
   state->changing = state->back = 0;
 }
@@ -135,7 +136,9 @@ static void watch(const hxControllerModel *model, const hxControllerInput *input
 static void fold(const hxControllerModel *model, const hxControllerInput *input,
                  hxControllerState *state) {
   const int back = hx_absence_fold(&model->plan.absent, model->plan.planner.leg, input->angle,
-                                   &state->health, &state->plan.absence, &state->output);
+                                   (const int (*)[HX_JOINTS])state->health.faulty,
+                                   (const int (*)[HX_JOINTS])state->health.locked,
+                                   &state->plan.absence, &state->output);
   memcpy(state->output.absent, state->plan.absence.legs, sizeof state->output.absent);
   memcpy(state->output.outrun, state->plan.pace.outrun, sizeof state->output.outrun);
   memcpy(state->output.faulty, state->health.faulty, sizeof state->output.faulty);

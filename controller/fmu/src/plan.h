@@ -207,10 +207,10 @@ static inline int hx_walk_plan_ended(hxWalkPlan *plan) {
 }
 
 /* Takes lost legs out of service (C58). last: the last commands. Returns whether any is new. */
-static inline int hx_walk_plan_lose(const hxWalkPlanModel *model, const hxHealth *health,
+static inline int hx_walk_plan_lose(const hxWalkPlanModel *model, const int lost[HX_LEGS],
                                     const hxControllerOutput *last, hxWalkPlan *plan) {
   hxGaitClock *clock = &plan->paths.clock;
-  if (!hx_absence_change(&model->absent, health, last, &plan->absence)) return 0;
+  if (!hx_absence_change(&model->absent, lost, last, &plan->absence)) return 0;
   memcpy(clock->absent, plan->absence.legs, sizeof clock->absent);
   hx_gait_clock_drop(clock);
   hx_walk_plan_end(plan);

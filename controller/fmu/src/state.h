@@ -7,6 +7,7 @@
 #include "comply/paper.h"
 #include "hexapod/inside.h"
 #include "plan.h"
+#include "sense/health.h"
 #include "walk/fade.h"
 
 HX_HIDDEN_BEGIN

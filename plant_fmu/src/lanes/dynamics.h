@@ -38,7 +38,7 @@ static inline void sweep_sum(const hxModel *model, const hxRigid6 *own, hxReal r
   hx_inertia_downdate(I, sweep->inverse_d, sweep->U);
 }
 
-/* Does this for a tibia with several rows of contacts. */
+/* Adds the contacts of a tibia with several rows of them to its inertia, and passes it on. */
 HX_RARE void sweep_rows(const hxModel *model, const hxImplicit *implicit, int pack,
                         const hxRigid6 *own, const hxReal *resists, hxLegWork *leg, hxInertia6 *I) {
   row_inertia(model, implicit, pack, HX_FOOT, leg, I);

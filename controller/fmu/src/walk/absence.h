@@ -3,8 +3,8 @@
 #ifndef HX_ABSENCE_H
 #define HX_ABSENCE_H
 
-#include "../sense/health.h"
 #include "gait.h"
+#include "kinematics.h"
 
 typedef struct hxAbsenceModel {
   double period, handover; /* s, handover: of a load */
@@ -125,12 +125,12 @@ HX_SELDOM static void set_absent(const hxAbsenceModel *model, const int legs[HX_
 }
 
 /* Takes lost legs out of service, HX_MOST_ABSENT at most. Returns whether any is new. */
-static inline int hx_absence_change(const hxAbsenceModel *model, const hxHealth *health,
+static inline int hx_absence_change(const hxAbsenceModel *model, const int lost[HX_LEGS],
                                     const hxControllerOutput *last, hxAbsence *absence) {
   int legs[HX_LEGS], room = HX_MOST_ABSENT, any = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) room -= absence->legs[leg];
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int new = !absence->legs[leg] && room > 0 && hx_health_lost(health, leg);
+    const int new = !absence->legs[leg] && room > 0 && lost[leg];
     legs[leg] = absence->legs[leg] || new;
     if (!new) continue;
     memcpy(absence->command[leg], last->angle_ref[leg], sizeof absence->command[leg]);
@@ -166,18 +166,19 @@ HX_SELDOM static void folded(const hxLegSolver *leg, const int faulty[HX_JOINTS]
  * Returns whether it is there. angle: measured [rad]; swing: of the faulty joints on trial [rad].
  */
 HX_SELDOM static int fold_leg(const hxAbsenceModel *model, const hxLegSolver *leg, int k,
-                              const double angle[HX_JOINTS], const hxHealth *health, double swing,
-                              hxAbsence *absence, hxControllerOutput *output) {
-  const int lost = hx_health_lost(health, k);
+                              const double angle[HX_JOINTS], const int faulty[HX_JOINTS],
+                              const int locked[HX_JOINTS], double swing, hxAbsence *absence,
+                              hxControllerOutput *output) {
+  const int lost = faulty[0] || faulty[1] || faulty[2];
   const double step = fold_speed * model->period;
   double target[HX_JOINTS];
   int there = !lost;
-  folded(leg, health->faulty[k], health->locked[k], target);
+  folded(leg, faulty, locked, target);
   for (int j = 0; j < HX_JOINTS; ++j) {
     double *command = &absence->command[k][j], *planned = &output->angle_ref[k][j],
            *place = &absence->place[k][j];
     if (fabs(angle[j] - *place) > limp_way) *place = angle[j];
-    if (health->faulty[k][j]) target[j] = *place + swing;
+    if (faulty[j]) target[j] = *place + swing;
     const double wanted = lost ? target[j] : *planned;
     const double way = hx_clamp(wanted, leg->angle_min[j], leg->angle_max[j]) - *command;
     const double moved =
@@ -192,10 +193,12 @@ HX_SELDOM static int fold_leg(const hxAbsenceModel *model, const hxLegSolver *le
 }
 
 /* Replaces the commands of the legs out of service. Returns the first one that has returned to the
- * plan, -1 if none has. angle: measured [rad]. */
+ * plan, -1 if none has. angle: measured [rad]; faulty, locked: of the servos. */
 static inline int hx_absence_fold(const hxAbsenceModel *model, const hxLegSolver leg[HX_LEGS],
-                                  const double angle[HX_LEGS][HX_JOINTS], const hxHealth *health,
-                                  hxAbsence *absence, hxControllerOutput *output) {
+                                  const double angle[HX_LEGS][HX_JOINTS],
+                                  const int faulty[HX_LEGS][HX_JOINTS],
+                                  const int locked[HX_LEGS][HX_JOINTS], hxAbsence *absence,
+                                  hxControllerOutput *output) {
   static const double turn = 6.283185307179586;
   int back = -1, any = 0;
   for (int k = 0; k < HX_LEGS; ++k) any |= absence->legs[k];
@@ -204,7 +207,8 @@ static inline int hx_absence_fold(const hxAbsenceModel *model, const hxLegSolver
                swing = trial_swing * hx_cis(turn * time).y;
   ++absence->trial;
   for (int k = 0; k < HX_LEGS; ++k)
-    if (absence->legs[k] && fold_leg(model, &leg[k], k, angle[k], health, swing, absence, output) &&
+    if (absence->legs[k] &&
+        fold_leg(model, &leg[k], k, angle[k], faulty[k], locked[k], swing, absence, output) &&
         back < 0)
       back = k;
   return back;

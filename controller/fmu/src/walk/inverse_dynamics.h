@@ -3,8 +3,8 @@
 #ifndef HX_INVERSE_DYNAMICS_H
 #define HX_INVERSE_DYNAMICS_H
 
-#include "../comply/posture.h"
 #include "kinematics.h"
+#include "posture.h"
 #include <string.h>
 
 typedef struct hxInverseDynamics {

@@ -3,9 +3,9 @@
 #ifndef HX_PACE_H
 #define HX_PACE_H
 
-#include "../comply/posture.h"
 #include "command.h"
 #include "foot_paths.h"
+#include "posture.h"
 
 enum { HX_STANCE_SAMPLES = 5, HX_SAMPLES = HX_STANCE_SAMPLES + 16 };
 

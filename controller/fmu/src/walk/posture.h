@@ -1,5 +1,5 @@
 /* posture.h - height, roll and pitch of the torso over its feet (C10): from the walking frame K
- * to the torso frame T. Python: controller/comply/posture.py. */
+ * to the torso frame T. Python: controller/walk/posture.py. */
 #ifndef HX_POSTURE_H
 #define HX_POSTURE_H
 
