@@ -1,8 +1,7 @@
 """Tunes a servo gain of a standing robot while the FMU runs, by trials that are rolled back.
 
 From one saved state, trials of half a second under a sideways push differ in servo.kp alone. Golden
-section finds the gain of least sway and torque, which is then set for good, as a tunable block
-parameter of MATLAB is set between two steps.
+section finds the gain of least sway and torque.
 
 usage: python examples/06_tunable.py
 """

@@ -10,6 +10,7 @@ typedef struct fmi3InstanceData {
   fmi3InstanceEnvironment environment;
   fmi3LogMessageCallback log;
   fmi3IntermediateUpdateCallback intermediate; /* NULL: there are no intermediate updates */
+  void *before; /* saved state of the last step with updates; NULL before the first one */
 } fmi3InstanceData;
 
 _Static_assert(sizeof(fmi3Float64) == sizeof(double) &&
@@ -120,7 +121,10 @@ fmi3Instance fmi3InstantiateScheduledExecution(
       "scheduled execution");
 }
 
-void fmi3FreeInstance(fmi3Instance c) { hx_instance_free(c); }
+void fmi3FreeInstance(fmi3Instance c) {
+  if (c) free(((fmi3InstanceData *)c)->before);
+  hx_instance_free(c);
+}
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefined,
                                        fmi3Float64 tolerance, fmi3Float64 startTime,
@@ -443,8 +447,7 @@ static void update_intermediate(fmi3InstanceData *instance, double *end) {
 /* Steps from t to *end, with an intermediate update after each step of the solver before it. */
 static hxStatus step_in_parts(fmi3InstanceData *instance, double t, double *end, int *event) {
   hxInstance *base = &instance->base;
-  void *before = NULL;
-  hxStatus status = hx_instance_save(base, &before);
+  hxStatus status = hx_instance_save(base, &instance->before);
   for (double now = t; status == HX_OK && now < *end; now = hx_instance_time(base)) {
     int found = 0;
     status = hx_instance_step_to_event(base, now, *end - now, 2, &found);
@@ -452,8 +455,7 @@ static hxStatus step_in_parts(fmi3InstanceData *instance, double t, double *end,
     if (found && base->may_return_early) break;
     if (status == HX_OK && hx_instance_time(base) < *end) update_intermediate(instance, end);
   }
-  if (status != HX_OK && before) hx_instance_restore(base, before);
-  free(before);
+  if (status != HX_OK && instance->before) hx_instance_restore(base, instance->before);
   return status;
 }
 

@@ -34,7 +34,7 @@ LOAD_FLOOR = 1e-6  # N    a smaller sum of loads cannot be divided by
 LEAST_SCALE, LARGEST_SCALE = 0.5, 3.0  # 1    measured over modelled weight that is believed
 LIKELY = 1.2  # 1    of its planned load, or a third of the weight: a doubted foot bears no more
 WEIGHED = 0.9  # 1    of the heft, which changes faster: a larger scale has settled
-CARRYING = 0.1  # 1    in thirds of the weight: an awaited foot with more stands
+CARRIED = 0.2  # 1    in thirds of the weight: an awaited foot with more stands
 LARGEST_LEAN = 0.4  # 1    of the depth of the ground: distance of the centre of mass, each axis
 HIGH_SHARE = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
 
@@ -47,6 +47,7 @@ class Compliance(Stateful):
         load: smoothed load of the feet in thirds of the weight [1].
         torque: (6, 3) feed-forward torques of the servos [N m].
         touching: feet on the ground.
+        carrying: feet on the ground that carry so much that the gait clock need not wait for them.
         doubted: sensors that are replaced.
         misled: feet that follow their paths: their sensors have just been doubted, or all are.
         fallback: legs under kinematic control.
@@ -60,8 +61,8 @@ class Compliance(Stateful):
 
     STATE = (
         "detector", "watch", "touchdown", "landings", "burden", "trust", "load", "torque",
-        "touching", "doubted", "misled", "fallback", "grip", "regaining", "scale", "lean", "held",
-        "sure",
+        "touching", "carrying", "doubted", "misled", "fallback", "grip", "regaining", "scale",
+        "lean", "held", "sure",
     )  # fmt: skip
 
     def __init__(
@@ -105,7 +106,8 @@ class Compliance(Stateful):
         ):  # fmt: skip
             part.reset()
         self.load, self.torque = np.zeros(LEGS), np.zeros((LEGS, 3))
-        self.touching, self.doubted, self.misled, self.fallback = np.zeros((4, LEGS), np.bool_)
+        self.touching, self.carrying, self.doubted = np.zeros((3, LEGS), np.bool_)
+        self.misled, self.fallback = np.zeros((2, LEGS), np.bool_)
         self.grip, self.regaining = np.ones(LEGS), False
         self.scale, self.lean, self.held = 0.0, 0j, 1.0
         self.sure = 1.0, 0j, 1.0
@@ -151,16 +153,12 @@ class Compliance(Stateful):
         self.misled = (self.misled | fresh) & doubted & (plan.height <= EARLY) | blind
         self.doubted = doubted
 
-    def _carries(self) -> Mask:
-        """Returns the feet (6,) that carry so much that the gait clock need not wait for them."""
-        return self.touching & (self.load > CARRYING)
-
     def _meet_ground(self, plan: LoadPlan, met: Array) -> None:
         """Adapts the foot heights to early and late contacts (C36). met: as in _judge_sensors()."""
         self.regaining = True
         early = self.landings.early(met, plan.height)
         falling = np.where(early, plan.descent, 0.0)
-        searching = plan.awaited & ~self.misled & ~self._carries()
+        searching = plan.awaited & ~self.misled & ~self.carrying
         self.touchdown.step(
             self.touching, falling, plan.swinging, plan.standing, searching, self.misled
         )
@@ -280,7 +278,7 @@ class Compliance(Stateful):
         """
         if not self.parts.touchdown or self.trust.level < 1.0:
             return False
-        found = self._carries() if waiting else self.touching
+        found = self.carrying if waiting else self.touching
         hopeful = self.touchdown.offset > -REACH_LIMIT
         return bool((landing & ~found & ~self.misled & hopeful).any())
 
@@ -291,6 +289,7 @@ class Compliance(Stateful):
         """
         reported = float(force[self.detector.step(force[:, 2]), 2].sum())
         force = self._replace_forces(plan, force)
+        self.carrying = self.touching & (force[:, 2] > CARRIED * self.share)
         self.landings.look(self.touching, plan.height, plan.swinging)
         if self._contacts_differ(plan):
             self._examine_contacts(plan, force, reported)

@@ -30,7 +30,7 @@ REACH_SPEED = 0.08  # m/s    downwards
 REACH_LIMIT = 0.040  # m
 HOLD_LIMIT = 0.030  # m    upwards: the robots' step height
 GRACE = 0.040  # s    after the planned touch-down, in which a foot may be late
-PATIENCE = 0.020  # s    of the gait clock, in which a foot that it waits for begins to move down
+PATIENCE = 0.025  # s    of the gait clock, in which a foot that it waits for begins to move down
 RETURN_TIME = 0.060  # s    time constant with which an offset vanishes in the swing, or in doubt
 NEGLIGIBLE = 1e-5  # m    a smaller offset is set to 0
 
@@ -65,7 +65,7 @@ class Touchdown(Stateful):
 
     def _moved(self, touching: Mask, falling: Array, swinging: Mask, searching: Mask) -> Array:
         """Returns the next offsets (6,) [m]. Arguments are those of step()."""
-        eager = np.minimum(self.waited / PATIENCE, 1.0)
+        eager = np.minimum(self.waited / PATIENCE, 1.0) ** 2
         pace = REACH_SPEED * np.where(self.late > GRACE, 1.0, eager * eager)
         reached = np.maximum(self.offset - pace * self.period, -REACH_LIMIT)
         held = np.minimum(self.offset + falling, HOLD_LIMIT)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from functools import reduce
@@ -72,16 +71,7 @@ def _check(interface: Interface, name: str, value: float, driven: Collection[str
         near = nearest_name(name, free)
         fix = f"did you mean {near!r}?" if near else "name a parameter or an input without a source"
         raise FmuError(f"{component} has no such value to set", got=name, fix=fix)
-    low, high = (0.0, 1.0) if variable.type == "Boolean" else (variable.minimum, variable.maximum)
-    low, high = -math.inf if low is None else low, math.inf if high is None else high
-    is_whole = variable.type == "Real" or float(value).is_integer()
-    if not (math.isfinite(value) and low <= value <= high and is_whole):
-        raise FmuError(
-            f"{component}.{name} is out of range",
-            got=value,
-            expected=f"{low:g} to {high:g} {variable.unit or ''}".rstrip(),
-            fix="give a value within",
-        )
+    variable.check(value, FmuError, name=f"{component}.{name}")
 
 
 def _start(variable: Variable, value: float) -> float | int:

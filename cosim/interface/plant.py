@@ -7,7 +7,6 @@ documentation are generated from it.
 from __future__ import annotations
 
 import itertools
-import math
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -73,7 +72,8 @@ def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace)
         for one in _templates(component)
     )
     for variable in variables:
-        _check_start(variable)
+        if variable.start is not None:  # importers refuse others
+            variable.check(variable.start, HexapodError, name=variable.name)
     return Interface(
         component=component,
         robot=robot,
@@ -286,19 +286,3 @@ def _states(table: Mapping[str, Any]) -> Iterable[State]:
                 initial=expand_names(entry["initial"], labels, table) or (),
                 reinit=entry.get("reinit", False),
             )
-
-
-def _check_start(variable: Variable) -> None:
-    """Raises HexapodError for a start value out of range, for which importers refuse the FMU."""
-    low = -math.inf if variable.minimum is None else variable.minimum
-    high = math.inf if variable.maximum is None else variable.maximum
-    if variable.start is not None and not (
-        low <= variable.start <= high and math.isfinite(variable.start)
-    ):
-        raise HexapodError(
-            "start value out of range",
-            got=variable.start,
-            expected=f"{low:g} to {high:g} {variable.unit or ''}".rstrip(),
-            fix="correct the robot",
-            where=variable.name,
-        )

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 from hexapod_cosim.cosim.common.components import Component
-from hexapod_cosim.models.errors import unknown_name
+from hexapod_cosim.models.errors import HexapodError, unknown_name
 from hexapod_cosim.models.records import Robot
 
 Causality = Literal["input", "output", "parameter", "local"]
@@ -79,6 +80,16 @@ class Variable:
     initial: tuple[str, ...] | None
     group: str | None
     description: str
+
+    def check(self, value: float, error: Callable[..., HexapodError], *, name: str) -> None:
+        """Raises the error for a value that is out of range, or not whole where it must be."""
+        low, high = (0.0, 1.0) if self.type == "Boolean" else (self.minimum, self.maximum)
+        low, high = -math.inf if low is None else low, math.inf if high is None else high
+        is_whole = self.type == "Real" or float(value).is_integer()
+        if not (math.isfinite(value) and low <= value <= high and is_whole):
+            expected = f"{low:g} to {high:g} {self.unit or ''}".rstrip()
+            what, fix = f"{name} is out of range", "give a value within"
+            raise error(what, got=value, expected=expected, fix=fix)
 
 
 @dataclass(frozen=True, kw_only=True)

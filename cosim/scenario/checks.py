@@ -119,7 +119,7 @@ def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
 
 
 def _check_tunings(scenario: Scenario, interface: Interface) -> None:
-    """Checks that events change tunable parameters. Raises ScenarioError."""
+    """Checks that events give tunable parameters values in range. Raises ScenarioError."""
     tunable = [entry.name for entry in interface.variables if entry.variability == "tunable"]
     fixed = {entry.name for entry in interface.of_causality("parameter")} - set(tunable)
     for event in scenario.tunings:
@@ -136,6 +136,8 @@ def _check_tunings(scenario: Scenario, interface: Interface) -> None:
             raise _unknown(
                 "tunable parameter", event.parameter, tunable, "a tunable one", where=where
             )
+        name = f"{scenario.where}: event at {event.time:g} s: {event.parameter}"
+        interface.by_name[event.parameter].check(event.value, ScenarioError, name=name)
 
 
 def _not_a_parameter(name: str, causality: str, where: str) -> ScenarioError:

@@ -48,7 +48,7 @@ def packed(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def fmu(packed: Path) -> Iterator[Fmu]:
-    """Returns the FMU of a robot that is told to walk, on feet that feel a force."""
+    """Returns the FMU of a robot commanded to walk, on feet that feel a force."""
     with Fmu(packed, name="controller") as instance:
         begin(instance)
         yield instance

@@ -23,6 +23,7 @@ from hexapod_cosim.models import Robot
 from hexapod_cosim.models.kinematics import axis_quaternion, foot_centres, quaternion_product
 
 NO_LIMITS = Parts(limits=False)
+ONLY_1 = np.arange(6) == 1
 
 
 def contact_jacobians(robot: Robot) -> np.ndarray:
@@ -58,6 +59,23 @@ def test_the_held_share_of_the_planned_squeeze_is_what_creep_leaves_of_it(missin
         laws.feel(force)
         grown = 1.0 - math.exp(-k * PERIOD / ROBOT.gait.period)
         assert laws.held == pytest.approx(1.0 - missing * grown)
+
+
+@pytest.mark.parametrize(("share", "waits"), [(0.19, True), (0.21, False)])
+def test_the_clock_waits_until_a_foot_bears_a_fifteenth_of_the_weight_at_this_moment(
+    share: float, waits: bool
+) -> None:
+    """C50: the force counts as it is, not the smoothed load, which would be late."""
+    laws = make_laws(parts=Parts(fallback=False))
+    plan(laws, standing="101111")
+    laws.planned = laws.planned._replace(awaited=ONLY_1)
+    force = shared(laws)
+    force[1, 2] = share * WEIGHT / 3.0
+    laws.feel(force)
+    assert laws.touching[1]
+    assert laws.load[1] < 0.05
+    assert laws.waits(ONLY_1, waiting=True) == waits
+    assert not laws.waits(ONLY_1, waiting=False)  # it does not begin to wait for it
 
 
 @pytest.mark.parametrize("payload", [0.8, 1.0, 1.35])

@@ -165,7 +165,7 @@ def walk(
     yaw_rate: float,
     *,
     legs: tuple[int, ...],
-    told: tuple[complex, float],
+    ordered: tuple[complex, float],
     looks: int = 100,
 ) -> tuple[complex, float]:
     """Moves a torso with a steady twist over feet fixed to the ground; all but `legs` are in the
@@ -182,7 +182,9 @@ def walk(
         shaken = np.where(
             np.array(loads) > 0.0, feet, feet + 0.1 * np.sin(k)
         )  # feet in the air may be anywhere
-        hold.look(sight(plane=shaken, load=loads, yaw=yaw, velocity=told[0], yaw_rate=told[1]))
+        hold.look(
+            sight(plane=shaken, load=loads, yaw=yaw, velocity=ordered[0], yaw_rate=ordered[1])
+        )
     return way, yaw
 
 
@@ -192,13 +194,13 @@ def test_the_way_and_heading_lost_are_the_commanded_less_the_true_ones_whichever
     yaw_rate: float, legs: tuple[int, ...]
 ) -> None:
     hold, looks = make(), 100
-    told = 0.08 + 0.01j, 0.25
-    way, yaw = walk(hold, 0.07 - 0.02j, yaw_rate, legs=legs, told=told, looks=looks)
+    ordered = 0.08 + 0.01j, 0.25
+    way, yaw = walk(hold, 0.07 - 0.02j, yaw_rate, legs=legs, ordered=ordered, looks=looks)
     time = hold.every * PERIOD * looks
-    assert hold.heading == pytest.approx(told[1] * time - yaw, abs=1e-9)
+    assert hold.heading == pytest.approx(ordered[1] * time - yaw, abs=1e-9)
     # the commanded displacement, along the commanded heading in the middle of each look
-    middle = told[1] * hold.every * PERIOD * (np.arange(looks) + 0.5)
-    commanded = (told[0] * np.exp(1j * middle) * hold.every * PERIOD).sum()
+    middle = ordered[1] * hold.every * PERIOD * (np.arange(looks) + 0.5)
+    commanded = (ordered[0] * np.exp(1j * middle) * hold.every * PERIOD).sum()
     assert hold.way == pytest.approx(commanded - way, abs=1e-9)
 
 
@@ -233,7 +235,7 @@ def test_steering_drives_a_steady_loss_to_a_steady_correction_that_makes_it_good
 
 def test_parts_switched_off_do_nothing() -> None:
     hold = make(Parts(posture=False, path=False))
-    walk(hold, 0.07 + 0j, 0.1, legs=(0, 2, 4), told=(0.08 + 0j, 0.0))
+    walk(hold, 0.07 + 0j, 0.1, legs=(0, 2, 4), ordered=(0.08 + 0j, 0.0))
     hold.look(sight(height=seen_heights(0.01, 0.1, 0.1), tilt=(0.1, 0.1)))
     assert not any(hold.lift)
     assert hold.velocity == 0j

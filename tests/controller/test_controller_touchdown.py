@@ -160,12 +160,12 @@ def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_time_to_the_li
 
 
 def test_an_awaited_foot_searches_at_a_speed_that_grows_and_stops_within_a_period() -> None:
-    """C50: the speed grows with the square of the time waited, to its full value in 20 ms."""
+    """C50: the speed grows with the time waited to the power 4, to its full value in 25 ms."""
     down, reached = Touchdown(period=STEP), 0.0
     for search in range(2):  # the second search begins as slowly as the first
         for k in range(1, 21):
             down.step(NO, STILL, YES, NO, only_leg(2), NO)
-            reached -= 0.08 * STEP * min(k * STEP / 0.02, 1.0) ** 2
+            reached -= 0.08 * STEP * min(k * STEP / 0.025, 1.0) ** 4
             assert down.offset[2] == pytest.approx(max(reached, -0.04), abs=1e-12)
         assert np.count_nonzero(down.offset) == 1
         found = down.offset[2]

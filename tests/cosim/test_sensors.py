@@ -253,6 +253,12 @@ def test_the_last_command_stays_while_commands_are_lost_but_for_the_first(lost: 
             "an event on a fixed parameter: got 'foot.radius'",
         ),
         ("{time=1, parameter='servo.kpp', value=40}", "did you mean 'servo.kp'"),
+        (
+            "{time=1, parameter='friction.mu', value=-1}",
+            "event at 1 s: friction.mu is out of range: got -1.0, expected 0 to 100 1; "
+            "give a value within",
+        ),
+        ("{time=2, parameter='torso.mass', value=0}", "got 0.0, expected 1e-09 to 1e+09 kg"),
         ("{time=1, sensor='attitude', fault='noisy'}", "'noisy'"),
     ],
 )

@@ -96,8 +96,8 @@ def test_a_program_elsewhere_finds_it_by_find_package(prefix: Path, tmp_path: Pa
         f"-DCMAKE_C_FLAGS={STRICT}",
     )
     output(CMAKE, "--build", build)
-    told = output(build / "step")
-    assert all(text in told for text in SAYS), told
+    printed = output(build / "step")
+    assert all(text in printed for text in SAYS), printed
 
 
 def test_a_program_elsewhere_finds_it_by_pkg_config(prefix: Path, tmp_path: Path) -> None:
@@ -108,10 +108,10 @@ def test_a_program_elsewhere_finds_it_by_pkg_config(prefix: Path, tmp_path: Path
         "pkg-config", "--cflags", "--libs", "hexapod-plant", PKG_CONFIG_PATH=str(folder)
     ).split()
     output("cc", *STRICT.split(), EXAMPLE / "step.c", *flags, "-o", tmp_path / "step")
-    told = output(
+    printed = output(
         tmp_path / "step", LD_LIBRARY_PATH=str(folder.parent), DYLD_LIBRARY_PATH=str(folder.parent)
     )
-    assert all(text in told for text in SAYS), told
+    assert all(text in printed for text in SAYS), printed
     assert (
         output("pkg-config", "--modversion", "hexapod-plant", PKG_CONFIG_PATH=str(folder)).strip()
         == VERSION

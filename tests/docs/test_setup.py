@@ -123,8 +123,8 @@ def test_a_compiler_that_cannot_compile_is_reported_with_its_error_message(tmp_p
 @pytest.mark.parametrize("name", ["CMAKE_TOOLCHAIN_FILE", "CMAKE_C_COMPILER"])
 def test_a_toolchain_that_is_chosen_for_cmake_is_not_checked(tmp_path: Path, name: str) -> None:
     assert ask(tmp_path, HOOKS[0], CMAKE_ARGS=f"-D{name}=/some/where").returncode == 0
-    told = f"{HOOKS[0][:-1]}{{'cmake.define.{name}': '/some/where'}})"
-    assert ask(tmp_path, told).returncode == 0
+    question = f"{HOOKS[0][:-1]}{{'cmake.define.{name}': '/some/where'}})"
+    assert ask(tmp_path, question).returncode == 0
 
 
 # Tests what .ci/run needs and installs: a Python with venv of a version that is read, and pinned

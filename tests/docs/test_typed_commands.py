@@ -186,6 +186,12 @@ SAYS = {
     "03_own_controller.py": ["completed", "deg"],
     "04_two_fmus.py": ["40 measurements, 72 commands", "walks 0.37"],
     "06_tunable.py": ["servo.kp 40 -> 69.6 N m/rad", "energy audit"],
+    "08_block_parameters.py": [
+        "foot.radius is none of them",
+        "1 s, 129.10 mm high: torso.mass = 4",
+        "1.5 s, 126.17 mm high",
+        "scenario with the same events: 126.17 mm high",
+    ],
     "07_casadi.py": [
         "gradient    -3.72",
         "e-04 -6.82",

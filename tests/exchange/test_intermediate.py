@@ -26,16 +26,16 @@ def test_outputs_at_the_solvers_steps_are_those_of_the_motion_and_reading_change
 ) -> None:
     seen: list[tuple[float, float]] = []
     with (
-        Plant3(plant_library, intermediate=lambda t: seen.append((t, height(told)))) as told,
+        Plant3(plant_library, intermediate=lambda t: seen.append((t, height(watched)))) as watched,
         Plant3(plant_library) as alone,
         Plant3(plant_library) as fine,
     ):
-        for plant in (told, alone, fine):
+        for plant in (watched, alone, fine):
             dropped(plant)
         for k in range(STEPS):
-            for plant in (told, alone):
+            for plant in (watched, alone):
                 assert plant.step(k * H, H).status == OK
-        assert told.everything().tolist() == alone.everything().tolist()
+        assert watched.everything().tolist() == alone.everything().tolist()
         times, heights = np.array(seen).T
         assert len(times) > STEPS
         assert np.all(np.diff(times) > 0.0)

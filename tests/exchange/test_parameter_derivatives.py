@@ -11,6 +11,8 @@ from exchange_calls import INPUTS, STATES, UNKNOWNS, Array, directional, fetched
 from fmi3_plant import ARRAYS, Plant3
 from fmi_plant import ATHENA, MODEL_EXCHANGE, OK, Plant
 
+from hexapod_cosim.models.kinematics import rotation_matrix
+
 PARAMETERS = (
     "torso.mass", "torso.com[1]", "torso.inertia_xx", "LF.tibia.mass", "RM.femur.com[1]",
     "LR.coxa.inertia_zz", "contact.stiffness", "contact.restitution", "friction.mu",
@@ -87,6 +89,31 @@ def test_derivatives_by_parameters_are_the_limits_of_differences(
     size = np.abs(ends[0]) / (abs(value) or 1.0) * 1e-6 + np.abs(found).max() * DIFFERENCE
     assert np.all(np.abs(exact - found) <= size)
     assert np.abs(exact).max() > 0.0
+
+
+def test_seeds_of_the_torso_s_state_give_the_derivative_by_a_tuned_centre_of_mass(
+    running: Plant,
+) -> None:
+    assert running.set_reals({"torso.push_torque[3]": 3.0, "torso.push_force[2]": 20.0}) == OK
+    assert running.step(0.0, 0.05) == OK
+    quaternion = np.array(running.reals([f"torso.quaternion[{i}]" for i in (1, 2, 3, 4)]))
+    spin = np.array(running.reals([f"torso.angular_velocity[{i}]" for i in (1, 2, 3)]))
+    moved = rotation_matrix(quaternion)[:, 1]  # by a change of torso.com[2]
+    knowns = [f"torso.{of}[{i}]" for of in ("position", "velocity") for i in (1, 2, 3)]
+    change = [1.0, *moved, *np.cross(spin, moved)]
+    exact = directional(running, SHOWN, ["torso.com[2]", *knowns], change)[1]
+    held = directional(running, SHOWN, ["torso.com[2]"], [1.0])[1]
+    com, h, ends = running.real("torso.com[2]"), 1e-5, []
+    for sign in (1.0, -1.0):
+        state = running.save()
+        assert running.set_reals({"torso.com[2]": com + sign * h}) == OK
+        ends.append(np.array(running.reals(SHOWN)))
+        assert running.call("fmi2SetFMUstate", state) == OK
+        running.free(state)
+    found = (ends[0] - ends[1]) / (2.0 * h)
+    size = np.abs(found).max() * DIFFERENCE
+    assert np.all(np.abs(exact - found) <= size)
+    assert np.abs(held - found).max() > 1.0
 
 
 @pytest.mark.parametrize("name", OF_MOTOR)

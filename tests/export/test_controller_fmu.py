@@ -136,11 +136,11 @@ def test_every_parameter_is_tunable_before_the_start(tmp_path: Path, compliant_f
     plain = ControllerSetup(robot=athena, gait=make_gait(athena), period=PERIOD)
     with packed(wanted, tmp_path) as exported:
         parameters, expected = exported.parameters(), walk(exported, 0, 300, h=0.004)
-    with Fmu(export_controller(plain, tmp_path / "plain.fmu")) as told:
-        assert told.variables.keys() == exported.variables.keys()
-        told.set_parameters(parameters)
-        told.initialise(0.0, 60.0)
-        np.testing.assert_array_equal(walk(told, 0, 300, h=0.004), expected)
+    with Fmu(export_controller(plain, tmp_path / "plain.fmu")) as parametrised:
+        assert parametrised.variables.keys() == exported.variables.keys()
+        parametrised.set_parameters(parameters)
+        parametrised.initialise(0.0, 60.0)
+        np.testing.assert_array_equal(walk(parametrised, 0, 300, h=0.004), expected)
 
 
 def test_saved_restored_and_serialised_states_continue_bit_for_bit(

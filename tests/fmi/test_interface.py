@@ -150,20 +150,20 @@ def test_generated_files_are_what_the_generator_makes() -> None:
 def test_the_model_description_agrees_with_the_interface(athena_fmu: Path) -> None:
     description = fmpy.read_model_description(str(athena_fmu))
     assert description.guid == GUID
-    for variable, told in zip(ATHENA.variables, description.modelVariables, strict=True):
-        assert (told.name, told.valueReference, told.type) == (
+    for variable, described in zip(ATHENA.variables, description.modelVariables, strict=True):
+        assert (described.name, described.valueReference, described.type) == (
             variable.name,
             variable.reference,
             variable.type,
         )
-        assert (told.causality, told.variability, told.unit) == (
+        assert (described.causality, described.variability, described.unit) == (
             variable.causality,
             variable.variability,
             variable.unit,
         )
         for text, number in (
-            (told.start, variable.start),
-            (told.min, variable.minimum),
-            (told.max, variable.maximum),
+            (described.start, variable.start),
+            (described.min, variable.minimum),
+            (described.max, variable.maximum),
         ):
             assert (None if text is None else float(text)) == number, variable.name

@@ -272,7 +272,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("case", FAULTS)
 def test_a_controller_that_fails_is_replaced_by_joints_that_hold(tmp_path: Path, case: str) -> None:
-    act, told = FAULTS[case]
+    act, message = FAULTS[case]
     (tmp_path / "law.py").write_text(FAILS.format(act=act), encoding="utf-8")
     scenario = load_scenario("stand", overrides=[f"control={tmp_path / 'law.py'}:Fails"])
     choices = Choices(scenario, control_texts(scenario, ("kinematic",)), {})
@@ -280,7 +280,7 @@ def test_a_controller_that_fails_is_replaced_by_joints_that_hold(tmp_path: Path,
         held = go(robot, 19, STAND)[-1]
         assert robot.fault == ""
         angles = go(robot, 50, STAND)
-        assert told in robot.fault
+        assert message in robot.fault
         assert (robot.stopped, robot.count) == (False, 69)
         np.testing.assert_array_equal(angles, np.tile(held, (50, 1)))
         # another control places the robot anew, and walks

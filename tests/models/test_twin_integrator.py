@@ -220,9 +220,9 @@ def test_steps_on_the_torque_speed_line_are_the_plants(core: ct.CDLL, name: str)
     fast = {"speed": 0.6 * robot.servo.speed_max * ways, "position": np.array([0.0, 0.0, 2.0])}
     body = body_states(robot, **(random_pose(robot, 1) | fast))
     command = Command(angle_ref=robot.stance + 3.0 * ways)
-    told = (command.angle_ref, command.speed_ref, command.torque_ref)
+    refs = (command.angle_ref, command.speed_ref, command.torque_ref)
     angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
-    _, damping = servo_slopes(robot.servo, angle, speed, *told)
+    _, damping = servo_slopes(robot.servo, angle, speed, *refs)
     assert np.all(damping == robot.servo.torque_max / robot.servo.speed_max)
     assert_same_steps(core, robot, body, command, [2.0 * h])
 

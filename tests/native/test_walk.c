@@ -22,7 +22,7 @@ static hxOutput walk(int control) {
   hxController *controller = hx_controller_create();
   hxControllerDefinition definition;
   hxControllerInput sensed;
-  hxControllerOutput told;
+  hxControllerOutput joints;
   hxInput input;
   hxOutput seen;
   memset(&seen, 0, sizeof seen);
@@ -36,10 +36,10 @@ static hxOutput walk(int control) {
     const double t_end = (k + 1) * h;
     hx_plant_output(plant, &input, &seen);
     sense(&seen, &sensed);
-    hx_controller_output(controller, &sensed, &told);
-    memcpy(input.angle_ref, told.angle_ref, sizeof input.angle_ref);
-    memcpy(input.speed_ref, told.speed_ref, sizeof input.speed_ref);
-    memcpy(input.torque_ref, told.torque_ref, sizeof input.torque_ref);
+    hx_controller_output(controller, &sensed, &joints);
+    memcpy(input.angle_ref, joints.angle_ref, sizeof input.angle_ref);
+    memcpy(input.speed_ref, joints.speed_ref, sizeof input.speed_ref);
+    memcpy(input.torque_ref, joints.torque_ref, sizeof input.torque_ref);
     CHECK(hx_controller_step(controller, &sensed, NULL, t_end) == HX_OK);
     CHECK(hx_plant_step(plant, &input, t_end) == HX_OK);
   }

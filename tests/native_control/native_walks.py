@@ -86,7 +86,7 @@ def differences(
     *,
     sense: Sense,
     steps: int = STEPS,
-    told: Callable[[float], BodyCommand] = program,
+    command_at: Callable[[float], BodyCommand] = program,
     changes: dict[int, Gait] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the largest differences of angle, speed, torque and acceleration over a walk, in rad
@@ -108,8 +108,8 @@ def differences(
         if changes and k in changes:
             reference.change_gait(changes[k])
             native.change_gait(changes[k])
-        expected = reference.step(t, told(t), measurement)
-        out = native.step(t, told(t), measurement)
+        expected = reference.step(t, command_at(t), measurement)
+        out = native.step(t, command_at(t), measurement)
         gap = np.abs(commands(out) - [getattr(expected, name) for name in COMMANDS])
         worst = np.maximum(worst, gap.max(axis=(1, 2)) / scale)
         if not (worst <= LIMITS).all():

@@ -160,7 +160,7 @@ def test_feet_of_joints_that_are_too_slow_are_awaited_as_others_are(
     slow = replace(setup.robot, servo=replace(setup.robot.servo, speed_max=speed_max))
     robot = replace(setup, robot=slow, gains=make_gains(slow))
     worst, _ = differences(
-        controller_core, robot, sense=sense, told=lambda t: program(0.7 * t), steps=2000
+        controller_core, robot, sense=sense, command_at=lambda t: program(0.7 * t), steps=2000
     )
     assert close(worst)
     assert 0.14 < np.mean(sense.waiting) < 0.16

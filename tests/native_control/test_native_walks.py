@@ -90,7 +90,9 @@ def test_a_walk_that_loses_two_legs_and_takes_them_back_is_the_same(
 
     setup = replace(setup_of(), law=law)
     straight = BodyCommand(vx=0.06)
-    worst, _ = differences(controller_core, setup, sense=sense, steps=1200, told=lambda _: straight)
+    worst, _ = differences(
+        controller_core, setup, sense=sense, steps=1200, command_at=lambda _: straight
+    )
     assert close(worst)
     alone, both, none = (True, *5 * (False,)), (True, *4 * (False,), True), 6 * (False,)
     assert {none, alone, both} <= absent
@@ -102,7 +104,7 @@ def test_a_walk_that_outruns_its_joints_is_the_same(controller_core: ct.CDLL, na
     shown: set[bool] = set()
     ground = Ground()
 
-    def told(t: float) -> BodyCommand:
+    def command_at(t: float) -> BodyCommand:
         if t < 3.0:
             return BodyCommand(0.5, 0.2, 0.4, -0.01, 0.03, 0.02)
         return BodyCommand(vx=0.01) if t < 4.5 else BodyCommand(yaw_rate=-2.5)
@@ -113,7 +115,12 @@ def test_a_walk_that_outruns_its_joints_is_the_same(controller_core: ct.CDLL, na
 
     changes = {200: make_gait(load_robot(name), "wave")}
     worst, _ = differences(
-        controller_core, setup_of(name), sense=sense, told=told, changes=changes, steps=1200
+        controller_core,
+        setup_of(name),
+        sense=sense,
+        command_at=command_at,
+        changes=changes,
+        steps=1200,
     )
     assert close(worst)
     assert shown == {False, True}

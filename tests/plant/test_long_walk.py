@@ -33,8 +33,8 @@ def walking(robot: Robot, duration: float) -> Iterator[tuple[float, Command]]:
     controller = Controller(robot, period=H, gait=make_gait(robot, robot.gait.name))
     nothing, forward = Measurement(), BodyCommand(vx=0.08)
     for k in range(round(duration / H)):
-        told = controller.step(k * H, forward, nothing)
-        yield (k + 1) * H, Command(angle_ref=told.angle_ref.copy(), speed_ref=told.speed_ref.copy())
+        sent = controller.step(k * H, forward, nothing)
+        yield (k + 1) * H, Command(angle_ref=sent.angle_ref.copy(), speed_ref=sent.speed_ref.copy())
 
 
 def standing(core: ct.CDLL, robot: Robot) -> Plant:

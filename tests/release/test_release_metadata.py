@@ -60,7 +60,7 @@ def test_the_release_workflow_runs_targets_that_exist_and_publishes_nothing() ->
     assert "publish" not in commands
 
 
-# What others must be told of licences travels with everything that holds software: the report's
+# What others must know of licences travels with everything that holds software: the report's
 # viewer, the wheel, every FMU.
 
 PACKAGES = ROOT / "cosim" / "viewer" / "node_modules"

@@ -189,7 +189,7 @@ def rounded(command: Command) -> Command:
 
 @pytest.mark.parametrize("period", [0.01, 0.008])
 def test_servos_hold_what_was_transmitted_last(core: ct.CDLL, period: float) -> None:
-    """A plant without a bus that is told the held commands makes the same motion, bit for bit."""
+    """A plant without a bus whose inputs are held moves the same, bit for bit."""
     on_bus, alone = robots(bus_period=period, command_step=STEP)
     ours, theirs = (Plant(core, robot, **landing(robot)) for robot in (on_bus, alone))
     held, sent = random_command(on_bus, 0, size=0.2), 0
@@ -200,9 +200,9 @@ def test_servos_hold_what_was_transmitted_last(core: ct.CDLL, period: float) -> 
         while theirs.time < end:
             if theirs.time >= sent * period - 1e-9:
                 held, sent = rounded(command), sent + 1
-            told = replace(held, push_force=command.push_force, push_torque=command.push_torque)
+            pushed = replace(held, push_force=command.push_force, push_torque=command.push_torque)
             next_one = sent * period
-            theirs.step(next_one if next_one < end - 1e-9 else end, told)
+            theirs.step(next_one if next_one < end - 1e-9 else end, pushed)
         assert np.array_equal(ours.bodies, theirs.bodies)
     assert sent == 1 + int((0.06 - 1e-9) / period)
 

@@ -69,13 +69,13 @@ def test_the_plants_servos_are_the_twins(core: ct.CDLL, name: str, mode: str) ->
     plant, servo, rng = Plant(core, robot), robot.servo, np.random.default_rng(1)
     clipped = 0
     for _ in range(60):
-        angle, speed, *told = rng.normal(0.0, [0.3, 2.0, 0.3, 1.0, 3.0])
+        angle, speed, *refs = rng.normal(0.0, [0.3, 2.0, 0.3, 1.0, 3.0])
         motor, external = rng.normal(0.0, 3.0, 2)
-        state = [np.array([value]) for value in (angle, speed, *told)]
+        state = [np.array([value]) for value in (angle, speed, *refs)]
         power = Power(1.0, 1.0, float(rng.choice((1.0, 0.3, 0.0))))
         torque = servo_torque(servo, *state, power=power)
         slopes = servo_slopes(servo, *state, power=power)
-        given = np.array([*told, power.strength])
+        given = np.array([*refs, power.strength])
         got = probed(core.hx_probe_servo, plant, angle, speed, given, size=4)
         drag = servo.coulomb_friction / servo.friction_speed
         drag *= 1.0 - math.tanh(speed / servo.friction_speed) ** 2
@@ -246,8 +246,8 @@ def test_a_robot_file_chooses_a_servo_by_name_and_may_change_its_numbers() -> No
 
 def test_a_scenario_chooses_a_servo_and_a_lower_voltage_softens_it() -> None:
     full = scenario_robot(load_scenario("amble", overrides=["servo.model=mx64_m1"])).servo
-    told = ["servo.model=mx64_m1", "servo.voltage=9 V"]
-    low = scenario_robot(load_scenario("amble", overrides=told)).servo
+    settings = ["servo.model=mx64_m1", "servo.voltage=9 V"]
+    low = scenario_robot(load_scenario("amble", overrides=settings)).servo
     assert low.kp == pytest.approx(0.75 * full.kp)
     assert low.torque_max == pytest.approx(0.75 * full.torque_max)
     assert low.speed_max == pytest.approx(0.75 * full.speed_max)

@@ -83,10 +83,10 @@ def test_the_plant_follows_the_published_equations(core: ct.CDLL, name: str) -> 
 def test_smooth_friction_converges_to_the_published_clipped_one(name: str, most: float) -> None:
     """The error is below `most` [rad] at 0.02 rad/s, and falls as the friction's speed does."""
     measured = measured_servo(name)
-    told = (measured.fields, measured.about.duty_gain, ROD, target, TIMES)
-    clipped = clipped_swing(*told, step=1e-5)
+    of_bench = (measured.fields, measured.about.duty_gain, ROD, target, TIMES)
+    clipped = clipped_swing(*of_bench, step=1e-5)
     errors = [
-        float(np.max(np.abs(smooth_swing(*told, friction_speed=speed)[0] - clipped)))
+        float(np.max(np.abs(smooth_swing(*of_bench, friction_speed=speed)[0] - clipped)))
         for speed in (0.02, 0.002)
     ]
     assert errors[0] < 1.1 * most

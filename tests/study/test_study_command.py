@@ -93,8 +93,8 @@ def test_a_full_disk_stops_the_command_and_with_room_it_is_resumed(
 
     with monkeypatch.context() as patch:
         patch.setattr(store_module.Store, "__init__", small)
-        code, told, err = call(*words)
-    assert (code, told, err.count("\n")) == (1, "", 1)
+        code, printed, err = call(*words)
+    assert (code, printed, err.count("\n")) == (1, "", 1)
     assert "the disk is full" in err
     assert "start the study again: it goes on" in err
     kept = stored_count(load_study(str(file)), out)

@@ -87,11 +87,11 @@ def test_the_command_runs_a_study_and_its_report_holds_everything(
         "[factors]\nfriction.mu = [0.17, 0.5, 0.7]\ncommand.vx = [0.05, 0.08]\n"
     )
     save_gains(make_gains(load_robot("athena")), gains)
-    code, told, err = call(
+    code, stdout, err = call(
         "study", file, "-o", out, "--fmu", athena_fmu, "--gains", gains, "--workers", "1", "--json"
     )
     assert code == 0, err
-    summary = json.loads(told)
+    summary = json.loads(stdout)
     assert (summary["runs"], summary["walked"]) == (24, {"kinematic": 8, "compliant": 8})
     page = (out / "report.html").read_text()
     for text in (
@@ -108,9 +108,9 @@ def test_the_command_runs_a_study_and_its_report_holds_everything(
     assert "http://" not in page.replace("http://www.w3.org", "")
     assert {path.stem for path in (out / "plots").iterdir()} == {"heat_map"}
     (out / "report.html").unlink()
-    code, told, err = call("report", out)
+    code, stdout, err = call("report", out)
     assert (code, (out / "report.html").read_text()) == (0, page), err
-    assert "report.html" in told
+    assert "report.html" in stdout
 
 
 def optimisation(**changes: Any) -> dict[str, Any]:

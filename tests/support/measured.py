@@ -81,7 +81,7 @@ def repeated(scenario: Scenario, recording: Recording, *, begin: float) -> Repea
         outputs = [name for name in plant.names("output") if name in recording.names]
         places = [recording.names.index(name) for name in outputs]
         peaks = [recording.names.index(name) for name in PEAK]
-        seen, told = plant.block(names), plant.block(joints)
+        seen, inputs = plant.block(names), plant.block(joints)
         measures, peak = plant.block(outputs), plant.block(PEAK)
         largest = np.zeros(len(PEAK))
         for k in range(count + 1):
@@ -95,8 +95,8 @@ def repeated(scenario: Scenario, recording: Recording, *, begin: float) -> Repea
             if k == count:
                 break
             if k % per_step == 0:
-                told.values[:] = commands[k // per_step]
-                told.set()
+                inputs.values[:] = commands[k // per_step]
+                inputs.set()
             if k >= first:
                 seen.get()
                 rows[0, k - first] = seen.values

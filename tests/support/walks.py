@@ -43,8 +43,10 @@ class Walk:
         outputs = [
             entry.name for entry in load_interface(ROBOT).variables if entry.causality == "output"
         ]
-        told = (*PLANNED, *(f"controller.{leg}.swinging" for leg in LEG_NAMES)) if planned else ()
-        self.names = ("time", *outputs, *told, *COMMAND_COLUMNS)
+        planned_columns = (
+            (*PLANNED, *(f"controller.{leg}.swinging" for leg in LEG_NAMES)) if planned else ()
+        )
+        self.names = ("time", *outputs, *planned_columns, *COMMAND_COLUMNS)
         self.time: NDArray[np.float64] = h * np.arange(
             round(cycles * PERIOD / h) + 1, dtype=np.float64
         )

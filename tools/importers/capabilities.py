@@ -95,12 +95,12 @@ def updated(fmu3: Path) -> Capability:
     seen: list[tuple[float, float]] = []
 
     def update(_environment: Any, time: float, *_: Any) -> None:
-        seen.append((time, told.getFloat64([of["torso.position"]], 3)[2]))
+        seen.append((time, watched.getFloat64([of["torso.position"]], 3)[2]))
 
     every = []
-    with running(fmu3, update) as (told, of), running(fmu3) as (fine, _):
+    with running(fmu3, update) as (watched, of), running(fmu3) as (fine, _):
         for k in range(STEPS):
-            told.doStep(k * STEP, STEP)
+            watched.doStep(k * STEP, STEP)
         for k in range(round(STEPS * STEP / FINE)):
             every.append(fine.getFloat64([of["torso.position"]], 3)[2])
             fine.doStep(k * FINE, FINE)

@@ -33,6 +33,7 @@ typedef struct hxCompliance {
   hxTrust trust;
   int felt[HX_LEGS];                 /* the foot's sensor reports a contact */
   int touching[HX_LEGS];             /* the foot is on the ground */
+  int carrying[HX_LEGS];             /* the gait clock need not wait for the foot any longer */
   double load[HX_LEGS];              /* 1    smoothed, in thirds of the weight */
   double torque[HX_LEGS][HX_JOINTS]; /* N m, for the servos */
   int doubted[HX_LEGS];              /* the foot's sensor is replaced */
@@ -62,8 +63,8 @@ static const double high_share = 0.25;
 static const double likely = 1.2;
 /* 1, of the heft, which changes faster: a larger scale has settled */
 static const double weighed = 0.9;
-static const double carrying =
-    0.1; /* 1, in thirds of the weight: an awaited foot with more stands */
+/* 1, in thirds of the weight: an awaited foot with more stands */
+static const double carried = 0.2;
 
 enum {
   HX_TRIPOD_LEGS = 3
@@ -176,11 +177,6 @@ static inline void judge_sensors(const hxComplianceModel *model, const hxLoadPla
   laws->burden.heft = laws->sure_heft;
 }
 
-/* Returns whether a foot carries so much that the gait clock need not wait for it. */
-static inline int carries(const hxCompliance *laws, int leg) {
-  return laws->touching[leg] && laws->load[leg] > carrying;
-}
-
 /* Adapts the paths to ground that is met early or late (C36). */
 static inline void meet_ground(const hxComplianceModel *model, const hxLoadPlan *plan,
                                const double met[HX_LEGS], hxCompliance *laws) {
@@ -190,7 +186,7 @@ static inline void meet_ground(const hxComplianceModel *model, const hxLoadPlan 
   hx_landings_early(&laws->landings, met, plan->height, early);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     falling[leg] = early[leg] ? plan->descent[leg] : 0.0;
-    searching[leg] = plan->awaited[leg] && !laws->misled[leg] && !carries(laws, leg);
+    searching[leg] = plan->awaited[leg] && !laws->misled[leg] && !laws->carrying[leg];
   }
   hx_touchdown_step(model->period, laws->touching, falling, plan->swinging, plan->standing,
                     searching, laws->misled, &laws->touchdown);
@@ -350,7 +346,7 @@ static inline int hx_compliance_waits(const hxComplianceModel *model, const int 
   int waits = 0;
   if (!model->parts.touchdown || laws->trust.level < 1.0) return 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int found = waiting ? carries(laws, leg) : laws->touching[leg];
+    const int found = waiting ? laws->carrying[leg] : laws->touching[leg];
     waits |= landing[leg] && !found && !laws->misled[leg] &&
              laws->touchdown.offset[leg] > -hx_reach_limit;
   }
@@ -366,6 +362,8 @@ static inline void hx_compliance_step(const hxComplianceModel *model, const hxLo
   hx_contact_detector_step(model->weight, normal, laws->felt);
   for (int leg = 0; leg < HX_LEGS; ++leg) reported += laws->felt[leg] ? normal[leg] : 0.0;
   replace_forces(model, plan, force, laws);
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    laws->carrying[leg] = laws->touching[leg] && force[leg][2] > carried * model->share;
   hx_landings_look(laws->touching, plan->height, plan->swinging, &laws->landings);
   if (contacts_differ(plan, laws))
     examine_contacts(model, plan, (const double (*)[3])force, reported, laws);

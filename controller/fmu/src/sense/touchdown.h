@@ -21,7 +21,7 @@ static const double hold_limit = 0.030;     /* m, upwards: the largest step heig
 /* s, delay after the planned touch-down that is tolerated */
 static const double grace = 0.040;
 /* s, of the gait clock, in which a foot that it waits for begins to move down */
-static const double patience = 0.020;
+static const double patience = 0.025;
 static const double return_time = 0.060; /* s, in which an offset decays in the swing */
 static const double negligible = 1e-5;   /* m, a smaller offset is set to 0 */
 
@@ -42,7 +42,7 @@ static inline double faded(double offset, double period) {
  * clock has waited [s]. */
 static inline double moved(double offset, double late, double waited, double period, int touching,
                            double falling, int swinging) {
-  const double eager = fmin(waited / patience, 1.0),
+  const double part = fmin(waited / patience, 1.0), eager = part * part,
                pace = reach_speed * (late > grace ? 1.0 : eager * eager);
   if (waited > 0.0 || late > grace) return fmax(offset - pace * period, -hx_reach_limit);
   if (swinging && touching && falling > 0.0) return fmin(offset + falling, hold_limit);
