@@ -42,7 +42,8 @@ PRESETS = {
     "sts3215": ("sts3215_m1", "sts3215_12v"),
     "sts3250": ("sts3250",),
 }
-MODELS = {"xl330": tuple(TERMS), "sts3215": ("m1", "m3", "m4"), "sts3250": ("m1", "m3", "m4")}
+FEW = ("m1", "m3", "m4", "m6")
+MODELS = {"xl330": tuple(TERMS), "sts3215": FEW, "sts3250": FEW}
 TRAJECTORIES = ("lift_and_drop", "sin_sin", "sin_time_square")  # of K-Scale's five
 SEEN = ((0.535, 0.969), (8.0, 16.0, 32.0))  # masses [kg] and gains of K-Scale's that fits see
 MOST = 72  # logs of a servo that a fit or a preset is judged on

@@ -45,8 +45,6 @@ static size_t before_size(void) {
 
 size_t hx_work_size(void) { return before_size() + hx_scratch_size(); }
 
-size_t hx_plant_size(void) { return sizeof(hxPlant) + HX_WORK_ALIGNMENT + hx_work_size(); }
-
 hxStatus hx_plant_use_work(hxPlant *plant, void *memory, size_t size) {
   unsigned char *own = (unsigned char *)plant + sizeof *plant, *work = memory;
   if (!work) work = own + hx_shared_work_padding((uintptr_t)own);

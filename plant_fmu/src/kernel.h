@@ -102,9 +102,6 @@ const hxKernel *hx_kernel(void);
  * left there. */
 size_t hx_scratch_size(void);
 
-/* Returns the size of a plant with its own work space behind it, bytes. */
-size_t hx_plant_size(void);
-
 HX_HIDDEN_END
 
 #endif

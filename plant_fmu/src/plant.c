@@ -1,10 +1,12 @@
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "command/command.h"
 #include "ground/footprints.h"
 #include "hexapod/message.h"
+#include "hexapod/shared_work.h"
 #include "kernel.h"
 #include "plant/parts.h"
 #include "robot/robot.h"
@@ -37,13 +39,20 @@ void hx_plant_command(const hxPlant *plant, const hxInput *input, hxCommand *com
 const char *hx_plant_message(const hxPlant *plant) { return plant->message; }
 double hx_plant_time(const hxPlant *plant) { return plant->state.time; }
 
+/* The default reset uses the block: pages of the plant's own work space are left untouched. */
 hxPlant *hx_plant_create(void) {
-  hxPlant *plant = calloc(1, hx_plant_size());
+  const size_t size = HX_WORK_ALIGNMENT + hx_work_size();
+  unsigned char *block = malloc(size);
+  hxPlant *plant = block ? malloc(sizeof *plant + size) : NULL;
   hxDefinition definition;
-  if (!plant) return NULL;
-  hx_plant_use_work(plant, NULL, 0);
-  hx_definition_default(&definition);
-  hx_plant_reset(plant, &definition, 0.0);
+  if (plant) {
+    memset(plant, 0, sizeof *plant);
+    hx_plant_use_work(plant, block + hx_shared_work_padding((uintptr_t)block), hx_work_size());
+    hx_definition_default(&definition);
+    hx_plant_reset(plant, &definition, 0.0);
+    hx_plant_use_work(plant, NULL, 0);
+  }
+  free(block);
   return plant;
 }
 

@@ -53,15 +53,10 @@ static double number_at(const void *structure, const hxRange *range) {
   return real;
 }
 
-/* Returns the index of the first number outside its range, n: none. The plant calls it in every
- * step, so the common case, a double, comes first and alone. */
+/* Returns the index of the first number outside its range, n: none. */
 static size_t first_outside(const void *structure, const hxRange *range, size_t n) {
   for (size_t i = 0; i < n; ++i) {
-    double x;
-    if (range[i].is_int)
-      x = number_at(structure, &range[i]);
-    else
-      memcpy(&x, (const char *)structure + range[i].offset, sizeof x);
+    const double x = number_at(structure, &range[i]);
     if (!(x >= range[i].min && x <= range[i].max)) return i;
   }
   return n;

@@ -55,7 +55,7 @@ def test_a_robot_walks_for_a_minute_at_the_commanded_speed_without_falling(
 def test_a_hexapod_with_measured_servos_slips_less_than_without_control(
     control: str, most: float
 ) -> None:
-    """Its feet slip by 0.25 m/m under kinematic control; no servo is taken for a faulty one."""
+    """Its feet slip by 0.24 m/m under kinematic control; no servo is taken for a faulty one."""
     sets = ["robot=sts3215_hexapod", f"control={control}", "duration=5"]
     with Runner(everything=True) as runner:
         result = runner.simulate(load_scenario("walk_flat", overrides=sets))

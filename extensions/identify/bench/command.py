@@ -30,13 +30,15 @@ from hexapod_cosim.models.servos.motor import torque_per_volt
 from hexapod_cosim.models.servos.presets import followed, list_servos, measured_servo
 
 PRESETS = {"xl330": "xl330_fitted", "sts3215": "sts3215_12v", "sts3250": "sts3250"}  # of motors
-# Where a fit begins: servos that others published, with the makers' stall current [A] and no-load
-# speeds [rad/s]. None comes from the logs that a fit may be judged on.
-FEETECH = {"voltage": 12.0, "overload_time": 1.0, "overload_duty": 0.8, "overload_left": 0.2}
+# Where a fit begins: servos that others published, with the makers' stall currents [A] and no-load
+# speeds [rad/s] (data sheets of XL330-M288-T, ST-3215-C018: 0.222 s for 60 degrees, and STS3250:
+# 0.133 s). None comes from the logs that a fit may be judged on.
+STILL = {"friction_speed": 3e-4}  # rad/s  a joint that friction holds creeps at most so fast
+STS = {**STILL, "voltage": 12.0, "overload_time": 1.0, "overload_duty": 0.8, "overload_left": 0.2}
 STARTS: dict[str, tuple[str, dict[str, Any]]] = {
-    "xl330": ("xl330_m4", {"current_max": 1.47}),
-    "sts3215": ("sts3215_m1", {"goal_speed_max": 4.7, **FEETECH}),
-    "sts3250": ("sts3215_m1", {"goal_speed_max": 7.9, **FEETECH}),
+    "xl330": ("xl330_m4", {"current_max": 1.47, **STILL}),
+    "sts3215": ("sts3215_m1", {"goal_speed_max": 4.7, "current_max": 2.7, **STS}),
+    "sts3250": ("sts3215_m1", {"goal_speed_max": 7.9, "current_max": 2.4, **STS}),
 }
 SERVO, RESULT, REPORT = "servo.toml", "identify.json", "report.html"
 NUMBERS = ("number", "unit", "start", "found", "95 % interval")

@@ -123,10 +123,9 @@ class _Problem:
 
     def starts(self, seeds: int) -> list[Array]:
         """Returns the start's numbers and others near them."""
-        rng = np.random.default_rng(1)
-        size = len(self.rows)
-        further = [SPREAD * rng.standard_normal(size) for _ in range(seeds - 1)]
-        return [np.clip(z, *self.bounds()) for z in (np.zeros(size), *further)]
+        rng, size = np.random.default_rng(1), len(self.rows)
+        further = SPREAD * rng.standard_normal((seeds - 1, size))
+        return list(np.clip(np.vstack([np.zeros(size), further]), *self.bounds()))
 
     def bounds(self) -> tuple[Array, Array]:
         low, high = zip(*(row.bounds(self.before[row.key]) for row in self.rows), strict=True)

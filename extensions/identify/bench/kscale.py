@@ -1,7 +1,4 @@
-"""Reads logs of K-Scale (github.com/kscalelabs/sysid): Feetech servos; `torque` is their load.
-
-A reading that failed is 0: of the angle -pi, or a step of the encoder above it.
-"""
+"""Reads logs of K-Scale (github.com/kscalelabs/sysid): Feetech servos; `torque` is their load."""
 
 from __future__ import annotations
 
@@ -19,7 +16,7 @@ GAINS = {"sts3215": 0.164890901, "sts3250": 0.16382926}
 RODS = {0.1: 0.036, 0.15: 0.050}  # kg by length [m], from K-Scale's configurations
 NEGATIVE = 1024.0  # the load's sign bit
 UNITS = 1000.0  # of the load at full duty
-LEAST = -3.139  # rad  an angle below it failed
+LEAST = -3.139  # rad  below it the encoder's register is 0 or 1: the reading failed, as 0 of others
 
 
 def read(path: Path, table: Mapping[str, Any]) -> BenchLog:

@@ -37,7 +37,7 @@ class Unknown:
     def value(self, z: float, before: float) -> float:
         """Returns the value at a distance z from the value before, in units of the prior."""
         if self.positive:
-            return before * math.exp(self.prior * z)
+            return min(before * math.exp(self.prior * z), self.high)
         return min(max(before + self.prior * z, self.low), self.high)
 
     def distance(self, value: float, before: float) -> float:
