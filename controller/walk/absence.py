@@ -155,7 +155,7 @@ class Absence(Stateful):
 
         angle: (6, 3) measured [rad]; faulty, locked: (6, 3) servos.
         """
-        lost = faulty.any(axis=1)
+        lost = np.asarray(faulty.any(axis=1))
         swing = TRIAL_SWING * math.sin(math.tau * self.trial * self.period / TRIAL_TIME)
         self.trial += 1
         target = folded(self.solver, faulty, locked)
