@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from exchange_calls import STATES, Array
 from fmi_plant import ATHENA, OK, Plant
+from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from hexapod_cosim.controller import BodyCommand, Controller, Measurement, make_gait
@@ -74,7 +75,9 @@ class Walk:
         rows = [self.derivative(self.rates, n, seed) for seed in seeds]
         return self.h * np.vstack([np.array(rows).T, np.zeros((3, n + 3))])
 
-    def cost(self, numbers: Array, *, gradient: bool = False) -> tuple[Array, Array, Array]:
+    def cost(
+        self, numbers: Array, *, gradient: bool = False
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Returns the cost until each step, its gradient (steps, 3), and loaded feet (steps, 6)."""
         n, per = len(STATES), round(PERIOD / self.h)
         change = np.vstack([np.zeros((n, 3)), np.eye(3)])

@@ -64,7 +64,7 @@ static const double likely = 1.2;
 /* 1, of the heft, which changes faster: a larger scale has settled */
 static const double weighed = 0.9;
 /* 1, in thirds of the weight: an awaited foot with more stands */
-static const double carried = 0.2;
+static const double carrying_share = 0.2;
 
 enum {
   HX_TRIPOD_LEGS = 3
@@ -363,7 +363,7 @@ static inline void hx_compliance_step(const hxComplianceModel *model, const hxLo
   for (int leg = 0; leg < HX_LEGS; ++leg) reported += laws->felt[leg] ? normal[leg] : 0.0;
   replace_forces(model, plan, force, laws);
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    laws->carrying[leg] = laws->touching[leg] && force[leg][2] > carried * model->share;
+    laws->carrying[leg] = laws->touching[leg] && force[leg][2] > carrying_share * model->share;
   hx_landings_look(laws->touching, plan->height, plan->swinging, &laws->landings);
   if (contacts_differ(plan, laws))
     examine_contacts(model, plan, (const double (*)[3])force, reported, laws);

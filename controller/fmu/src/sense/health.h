@@ -89,11 +89,11 @@ static inline void hx_health_step(const hxHealthModel *model, const hxLegSolver 
     hx_leg_solver_load_torques(&leg[k], angle[k], force[k], load);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const double now = angle[k][joint], before = health->begun ? health->angle[k][joint] : now,
-                   speed = (now - before) / model->period, fastest = leg[k].speed_max,
+                   speed = (now - before) / model->period, speed_max = leg[k].speed_max,
                    speed_ref = command->speed_ref[k][joint],
                    reached = command->angle_ref[k][joint] +
-                             model->period * hx_clamp(speed_ref, -fastest, fastest),
-                   excess = unexplained(model, fastest, health->speed[k][joint], speed, speed_ref,
+                             model->period * hx_clamp(speed_ref, -speed_max, speed_max),
+                   excess = unexplained(model, speed_max, health->speed[k][joint], speed, speed_ref,
                                         reached - now, command->torque_ref[k][joint], load[joint],
                                         lifted[k] ? 0.0 : load[joint]);
       judge(model->period, excess, fabs(now - before) < still_speed * model->period, k, joint,
