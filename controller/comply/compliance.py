@@ -34,7 +34,7 @@ LOAD_FLOOR = 1e-6  # N    a smaller sum of loads cannot be divided by
 LEAST_SCALE, LARGEST_SCALE = 0.5, 3.0  # 1    measured over modelled weight that is believed
 LIKELY = 1.2  # 1    of its planned load, or a third of the weight: a doubted foot bears no more
 WEIGHED = 0.9  # 1    of the heft, which changes faster: a larger scale has settled
-CARRIED = 0.2  # 1    in thirds of the weight: an awaited foot with more stands
+CARRYING_SHARE = 0.2  # 1    in thirds of the weight: an awaited foot with more stands
 LARGEST_LEAN = 0.4  # 1    of the depth of the ground: distance of the centre of mass, each axis
 HIGH_SHARE = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
 
@@ -289,7 +289,7 @@ class Compliance(Stateful):
         """
         reported = float(force[self.detector.step(force[:, 2]), 2].sum())
         force = self._replace_forces(plan, force)
-        self.carrying = self.touching & (force[:, 2] > CARRIED * self.share)
+        self.carrying = self.touching & (force[:, 2] > CARRYING_SHARE * self.share)
         self.landings.look(self.touching, plan.height, plan.swinging)
         if self._contacts_differ(plan):
             self._examine_contacts(plan, force, reported)
