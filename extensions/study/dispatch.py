@@ -94,7 +94,9 @@ def cluster_workers(address: str) -> Iterator[Workers]:
     try:
         if not client.nthreads():
             warn(f"the cluster has no workers: waiting for some (dask worker {address})")
-        yield Workers(client.get_executor(pure=False), size, (KilledWorker,))
+        # Dask's executor raises ValueError for a chunk whose worker dies as soon as it has finished
+        deaths = KilledWorker, ValueError
+        yield Workers(client.get_executor(pure=False), size, deaths)
     finally:
         client.close(timeout=5)
 
