@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from fmpy import extract, read_model_description
-from fmpy.fmi2 import FMU2Slave
+from fmpy.simulation import instantiate_fmu
 
 from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.models import load_robot
@@ -26,13 +26,8 @@ class Bench:
     def __init__(self, path: Path) -> None:
         description = read_model_description(path)
         self.reference = {one.name: one.valueReference for one in description.modelVariables}
-        self.fmu = FMU2Slave(
-            guid=description.guid,
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            unzipDirectory=extract(path, path.with_suffix("")),
-            instanceName="plant",
-        )
-        self.fmu.instantiate()
+        unpacked = extract(path, path.with_suffix(""))
+        self.fmu = instantiate_fmu(unpacked, description, "CoSimulation")
         self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()
         self.fmu.exitInitializationMode()

@@ -141,7 +141,7 @@ class Interface:
 
     @cached_property
     def by_name(self) -> Mapping[str, Variable]:
-        """The variables by name."""
+        """Returns the variables by name."""
         return {variable.name: variable for variable in self.variables}
 
     @cached_property

@@ -55,7 +55,7 @@ class ServoFit:
 
     @property
     def values(self) -> dict[str, float]:
-        """The numbers by key."""
+        """Returns the found numbers [SI] by their keys."""
         return _values(self.rows, self.before, self.z)
 
     def interval(self, key: str) -> tuple[float, float]:
