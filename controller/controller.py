@@ -130,7 +130,7 @@ class Controller(Stateful):
         force = sense(measurement, LEVEL)
         lifted = plan.paths.clock.swinging & (plan.now.feet.rise > 0.0)
         health.step(measurement.angle, force, self._out, lifted)
-        if plan.lose(health.lost, self._out):
+        if plan.lose(health.lost, health.bearing, self._out):
             self._change()
 
     def _fold(self, measurement: Measurement) -> None:

@@ -199,14 +199,20 @@ class WalkPlan(Stateful):
         full = bool(((self.now.activation >= 1.0) | clock.absent).all())
         return not clock.walking or (clock.ended() and full)
 
-    def lose(self, lost: Mask, out: JointCommand) -> bool:
-        """Takes lost legs (6,) out of service (C58). Returns whether any is new."""
-        if not self.absence.change(lost, out):
-            return False
-        self.paths.clock.absent = self.absence.legs
-        self.end()
-        self.paths.clock.drop()
-        return True
+    def lose(self, lost: Mask, bearing: Mask, out: JointCommand) -> bool:
+        """Takes lost legs (6,) out of service (C58). Returns whether any is new.
+
+        Legs that stand and can bear a load (6,) wait until no other leg swings.
+        """
+        clock, absence = self.paths.clock, self.absence
+        waits = lost & bearing & ~clock.swinging & ~absence.legs
+        waits = waits & (absence.has_room() and (clock.swinging & ~lost).any())
+        new = absence.change(lost & ~waits, out)
+        if new or (waits.any() and not clock.dropped.any()):
+            clock.absent = absence.legs
+            self.end()
+            clock.drop()
+        return new
 
     def adopt(self, before: WalkPlan, back: int | None = None) -> None:
         """Begins with the standing feet and the command of the plan of another gait (C55).
@@ -221,7 +227,7 @@ class WalkPlan(Stateful):
         if back is not None:
             self.absence.take_back(back)
             clock.absent = self.absence.legs
-        self.now = self.now._replace(feet=self.paths.join(self.now.feet, self.absence.torso, back))
+        self.now = self.now._replace(feet=self.paths.join(self.now.feet, back))
         self.after, self.at, self.last, self.cut = None, 0, math.inf, True
         self._set_pace(self.pace.asked)
 

@@ -214,6 +214,13 @@ class Servo:
         back_emf = self.torque_constant**2 / self.resistance if motor else 0.0
         return back_emf + self.viscous_friction
 
+    @property
+    def torque_limit(self) -> float:
+        """Largest torque at rest, within the current that the firmware of a motor allows [N m]."""
+        if self.drive != "motor" or self.current_max == 0.0:
+            return self.torque_max
+        return min(self.torque_max, self.torque_constant * self.current_max)
+
 
 def _unused_fields(servo: Servo) -> list[str]:
     """Returns the names of the fields from `drive` on if all have their defaults, else none."""

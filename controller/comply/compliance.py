@@ -134,16 +134,18 @@ class Compliance(Stateful):
         self.touching = np.where(self.doubted, found, self.touching)
         return force
 
-    def _judge_sensors(self, plan: LoadPlan, met: Array, force: Array, reported: float) -> None:
+    def _judge_sensors(self, plan: LoadPlan, met: Array, force: Array, reported: Array) -> None:
         """Decides which sensors are doubted (C34): all of them once a tripod's are.
 
         met: (6,) heights at which the feet are expected to meet the ground [m]; force: (6, 3) that
-        the laws use; reported: sum of the normal forces that the sensors report [N].
+        the laws use; reported: (6,) normal forces that the sensors report [N].
         """
         high = plan.height > self.high + met
         most = np.maximum(self.share, LIKELY * self.scale * plan.shares.normal)
         known = float(np.minimum(force[:, 2], most)[self.doubted & ~high].sum())
-        total = np.where(self.doubted, reported, reported + known)
+        whole = float(reported.sum())
+        total = np.where(self.doubted, whole, whole + known)
+        total = np.where(high, whole + known - reported, total)
         doubted = self.watch.look(self.detector.touching, total, plan.standing | plan.awaited, high)
         blind = np.count_nonzero(doubted) >= TRIPOD_LEGS
         doubted = doubted | blind
@@ -163,7 +165,7 @@ class Compliance(Stateful):
             self.touching, falling, plan.swinging, plan.standing, searching, self.misled
         )
 
-    def _examine_contacts(self, plan: LoadPlan, force: Array, reported: float) -> None:
+    def _examine_contacts(self, plan: LoadPlan, force: Array, reported: Array) -> None:
         """Decides between a wrong sensor and an early or late contact; as _judge_sensors()."""
         met = self.landings.expected(self.touching, plan.height, plan.swinging)
         if self.parts.fallback:
@@ -287,7 +289,7 @@ class Compliance(Stateful):
 
         force: (6, 3) of the ground on the feet, walking frame [N].
         """
-        reported = float(force[self.detector.step(force[:, 2]), 2].sum())
+        reported = np.where(self.detector.step(force[:, 2]), force[:, 2], 0.0)
         force = self._replace_forces(plan, force)
         self.carrying = self.touching & (force[:, 2] > CARRYING_SHARE * self.share)
         self.landings.look(self.touching, plan.height, plan.swinging)

@@ -35,6 +35,7 @@ class Health(Stateful):
 
     Attributes, (6, 3) each:
         strange: time for which its torque has been unexplained, with its sign [s].
+        goal: angle that the firmware has led its servo to [rad].
         angle: measured at the last step [rad].
         speed: of the joint in the period before it [rad/s].
         still: time for which a joint has not moved [s].
@@ -43,7 +44,7 @@ class Health(Stateful):
         faulty: servos that do not work.
     """
 
-    STATE = ("strange", "angle", "speed", "still", "locked", "proof", "faulty")
+    STATE = ("strange", "goal", "angle", "speed", "still", "locked", "proof", "faulty")
 
     def __init__(
         self, robot: Robot, gains: Gains | None, *, legs: LegSolver, period: float
@@ -52,7 +53,9 @@ class Health(Stateful):
         self.stiffness, self.drag = robot.servo.kp, robot.servo.drag
         self.rotor = robot.servo.rotor_inertia
         self.legs, self.period = legs, period
-        self.most = math.inf if gains is None else gains.limits.torque  # N m
+        self.way = robot.servo.goal_speed_max * period or math.inf  # rad    of a goal, at most
+        allowed = math.inf if gains is None else gains.limits.torque
+        self.most = min(allowed, robot.servo.torque_limit)  # N m
         self.reset()
 
     def reset(self) -> None:
@@ -60,12 +63,19 @@ class Health(Stateful):
         self.strange, self.proof, self.still, self.speed = np.zeros((4, LEGS, 3))
         self.locked: Mask = np.zeros((LEGS, 3), dtype=np.bool_)
         self.angle: Array | None = None
+        self.goal: Array | None = None
         self.faulty: Mask = np.zeros((LEGS, 3), dtype=np.bool_)
 
     @property
     def lost(self) -> Mask:
         """Returns the legs (6,) of which some servo does not work."""
         return np.asarray(self.faulty.any(axis=1))
+
+    @property
+    def bearing(self) -> Mask:
+        """Returns the legs (6,) that can bear a load: neither femur nor tibia is limp."""
+        limp = self.faulty & ~self.locked
+        return np.asarray(~limp[:, 1:].any(axis=1))
 
     def _unexplained(
         self, angle: Array, force: Array, command: JointCommand, lifted: Mask
@@ -77,12 +87,16 @@ class Health(Stateful):
         low = -self.most * clamp(1.0 + load, 0.0, 1.0)
         high = self.most * clamp(1.0 - load, 0.0, 1.0)
         fastest = self.legs.speed_max
-        reached = command.angle_ref + self.period * clamp(command.speed_ref, -fastest, fastest)
-        torque = self.stiffness * (reached - angle) + command.torque_ref - self.drag * speed
+        goal = command.angle_ref + self.period * clamp(command.speed_ref, -fastest, fastest)
+        if self.goal is not None:
+            goal = clamp(goal, self.goal - self.way, self.goal + self.way)
+        self.goal = goal
+        torque = self.stiffness * (goal - angle) + command.torque_ref - self.drag * speed
         damping, nothing = DAMPING_TIME * self.stiffness, np.zeros((LEGS, 3))
         added = np.array([nothing, -damping * speed, damping * (command.speed_ref - speed)])
         torques = clamp(torque + added, low, high)
-        needed = self.legs.load_torques(angle, force)
+        # a larger load is no fault of the servo
+        needed = clamp(self.legs.load_torques(angle, force), -self.most, self.most)
         free = np.where(lifted[:, None], 0.0, needed)
         spin = self.rotor / self.period * (speed - self.speed)
         self.speed = speed

@@ -23,8 +23,7 @@ SLIDING_DRAG = 0.55  # 1    common tangential over normal force beyond the plan:
 CALM_CYCLES = 0.5  # 1    gait cycles without sliding until the feet are trusted again
 SLIDING_TIME = 0.04  # s    longer than a foot skids when it touches down
 TRUSTED = 0.99  # 1    so near to its goal the trust is at it
-AIRBORNE_TIME = 0.06  # s    longest plausible force on a foot in mid-swing
-ABSENT_TIME = 0.10  # s    longest plausible lack of force on a standing foot; both exceed the lag
+CONTRADICTION_TIME = 0.10  # s    longest plausible one; it exceeds the lag of the sensors
 MISSING_SHARE = 0.92  # 1    of the weight: with less, the force of some foot is not reported
 # 1    of the weight: as TOUCH_SHARE, LIFT_SHARE, for a doubted foot; more, because torso and feet
 # accelerate
@@ -112,16 +111,16 @@ class SensorWatch(Stateful):
 
         Args:
             touching: (6,) feet that report a force.
-            total: the sum of all normal forces [N]; or (6,) that for each foot.
+            total: (6,) for each foot the sum of all normal forces, without its own if it is high
+                [N]; or one for all feet.
             standing: (6,) legs that are planned to carry their whole share.
             high: (6,) feet that are planned well above the ground.
         """
-        absent = (total < self.missing) & standing & ~touching
-        wrong = (touching & high) | absent
+        lacking = total < self.missing
+        wrong = np.where(high, touching & ~lacking, standing & ~touching & lacking)
         self.contradicted = np.where(wrong, self.contradicted + self.period, 0.0)
-        too_long = self.contradicted > np.where(high, AIRBORNE_TIME, ABSENT_TIME)
         rest = np.maximum(self.left - self.period, 0.0)
-        self.left = np.where(too_long, self.memory, rest)
+        self.left = np.where(self.contradicted > CONTRADICTION_TIME, self.memory, rest)
         return self.doubted
 
     def found(self, load: Array, touching: Mask) -> Mask:

@@ -96,6 +96,10 @@ class Absence(Stateful):
         self.since = round((SHIFT_TIME + BACK_TIME) / self.period) + 1
         self.trial, self.begin, self.goal = 0, 0j, 0j
 
+    def has_room(self) -> bool:
+        """Returns whether another leg may be taken out of service."""
+        return int(self.legs.sum()) < MOST_ABSENT
+
     def change(self, lost: Mask, out: JointCommand) -> bool:
         """Takes lost legs (6,) out of service, at most MOST_ABSENT. Returns whether any is new.
 

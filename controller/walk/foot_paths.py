@@ -12,30 +12,22 @@ without sliding.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, across, cis
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, cis
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.gait_clock import CLOCK_EPSILON, NO_LEG, GaitClock
 from hexapod_cosim.controller.walk.swing import Twist, blend, hop, travel
 
 # 1/s, m/s    downwards, of feet that end their swings at once
 DROP_RATE, LANDING_SPEED = 10.0, 0.08
-AROUND = (0, 1, 2, 5, 4, 3)  # the legs around the robot, to the left
 FREEZE = 0.75  # 1    part of the swing after which the landing point stays fixed to the ground
 SAME_DISTANCE = 1e-6  # m    distances that differ by less are equal
 HOME_TOLERANCE = 1e-9  # m    a foot this close to its stance position need not step any more
 NEARLY_DONE = 1e-12  # 1    floor of 1 - s
-
-
-def inside(corners: Plane) -> float:
-    """Returns how far the origin is inside a polygon [m], < 0 outside. corners: to the left [m]."""
-    side = np.roll(corners, -1) - corners
-    return float((across(corners, side) / np.abs(side)).min())
 
 
 class PlannedFeet(NamedTuple):
@@ -244,26 +236,7 @@ class FootPaths(Stateful):
         far = np.abs(feet.plane - motion * time - self.aims())
         return float(far[~self.clock.absent].max())
 
-    def _steadiness(
-        self, feet: PlannedFeet, begin: Array, torso: Callable[[int], complex]
-    ) -> float:
-        """Returns the least distance of the torso within its support in the coming steps [m] (C58).
-
-        feet, begin: as for _farthest(); torso: its way from its nominal place [m].
-        """
-        lift, motion = self._lift_offs(begin), _ground_motion(feet)
-        ahead = self.aims() + motion * (self.landing_lead + lift)
-        least = np.inf
-        for leg in np.flatnonzero(~self.clock.absent):
-            for time in (lift[leg], lift[leg] + self.swing_time):
-                place = np.where(time < lift + self.swing_time, feet.plane, ahead) - motion * time
-                stands = [k for k in AROUND if k != leg and not self.clock.absent[k]]
-                least = min(least, inside(place[stands] - torso(round(time / self.period))))
-        return least
-
-    def join(
-        self, feet: PlannedFeet, torso: Callable[[int], complex], back: int | None = None
-    ) -> PlannedFeet:
+    def join(self, feet: PlannedFeet, back: int | None = None) -> PlannedFeet:
         """Begins the walk anew with feet that stand under a moving body (C55).
 
         One leg begins to give up its load: the first of those with which the farthest foot goes
@@ -276,10 +249,9 @@ class FootPaths(Stateful):
         unloads, offset = clock.unloads, np.array(self.gait.offsets)
         if back is not None:
             clock.start_at(0.5 + 0.5 * self.gait.duty + offset - offset[back])
-        absent = bool(clock.absent.any())
         for first in np.flatnonzero(~clock.absent) if back is None else ():
             begin = unloads + (offset - offset[first])
-            far = -self._steadiness(feet, begin, torso) if absent else self._farthest(feet, begin)
+            far = self._farthest(feet, begin)
             if far < least - SAME_DISTANCE:
                 least = far
                 clock.start_at(begin)

@@ -108,6 +108,38 @@ def test_a_rotor_that_slows_down_explains_a_torque() -> None:
         assert not health.lost.any()
 
 
+def test_a_load_beyond_the_strength_of_the_servo_is_no_fault() -> None:
+    """Of 9.6 N m that 80 N need, 5.4 count; the servo gives 4.4 of them at 0.11 rad."""
+    assert steps_until_faulty(-0.11, force=80.0) == 100
+    assert steps_until_faulty(0.0, force=80.0) == pytest.approx(STRANGE_TIME / H, abs=1)
+
+
+def test_a_servo_gives_no_more_than_the_current_that_its_firmware_allows() -> None:
+    """1.59315 A give 3.32 N m of a stall torque of 7.50 N m: half of them are unexplained."""
+    robot = load_robot("sts3215_hexapod")
+    assert robot.servo.torque_limit == pytest.approx(3.31633, rel=1e-5)
+    assert ROBOT.servo.torque_limit == 6.0
+    unlimited = replace(robot, servo=replace(robot.servo, current_max=0.0))
+    assert steps_until_faulty(0.06, robot=robot) == pytest.approx(STRANGE_TIME / H, abs=1)
+    assert steps_until_faulty(0.06, robot=unlimited) == 100
+
+
+def test_a_firmware_leads_a_servo_to_a_far_command_no_faster_than_it_allows() -> None:
+    """At 0.5 rad/s the goal needs 0.1 s for 0.05 rad, at which 2.04 of 3.32 N m are strange."""
+    robot = load_robot("sts3215_hexapod")
+    slow = replace(robot, servo=replace(robot.servo, goal_speed_max=0.5))
+    health = Health(slow, make_gains(slow), legs=LegSolver(slow), period=H)
+    command, angle = JointCommand(), slow.stance.copy()
+    command.angle_ref[...] = angle
+    health.step(angle, np.zeros((LEGS, 3)), command)
+    command.angle_ref[LF, 1] += 1.0
+    count = 0
+    while not health.lost.any():
+        health.step(angle, np.zeros((LEGS, 3)), command)
+        count += 1
+    assert count == pytest.approx((0.0407 / 0.5 + STRANGE_TIME) / H, abs=1)
+
+
 def test_a_joint_that_is_as_fast_as_it_can_is_no_fault() -> None:
     """A servo gives no torque at its largest speed, however far the command is ahead."""
     assert steps_until_faulty(0.5, drift=0.9 * ROBOT.servo.speed_max) == 100
@@ -138,6 +170,37 @@ def test_a_servo_is_sound_again_when_it_has_followed_for_some_time() -> None:
         health.step(angle, forces, command)
         count += 1
     assert count == pytest.approx(PROOF_TIME / H, abs=1)
+
+
+@pytest.mark.parametrize(
+    ("joint", "locked", "bears"), [(0, False, True), (1, False, False), (2, True, True)]
+)
+def test_a_leg_without_limp_femur_and_tibia_can_bear_a_load(
+    joint: int, locked: bool, bears: bool
+) -> None:
+    health = Health(ROBOT, make_gains(ROBOT), legs=SOLVER, period=H)
+    health.faulty[RR, joint], health.locked[RR, joint] = True, locked
+    assert health.bearing.tolist() == (mask(RR) <= bears).tolist()
+
+
+@pytest.mark.parametrize("bearing", [False, True])
+def test_a_lost_leg_that_can_bear_a_load_stands_until_no_other_leg_swings(bearing: bool) -> None:
+    controller = Controller(ROBOT, period=H, gait=make_gait(ROBOT), gains=make_gains(ROBOT))
+    plan, out = controller.plan, JointCommand()
+    plan.aim(BodyCommand(vx=0.04))
+    while not (plan.now.feet.rise < 0.0).any():  # in the middle of the first swings
+        plan.advance(False)
+    stands = int(np.flatnonzero(~plan.paths.clock.swinging)[0])
+    able = np.full(LEGS, bearing)
+    assert plan.lose(mask(stands), able, out) is not bearing
+    steps = 0
+    while plan.paths.clock.swinging.any():
+        assert plan.lose(mask(stands), able, out) is False
+        plan.advance(False)
+        steps += 1
+    assert 0.05 < steps * H < 0.3  # straight down from within the step height of 40 mm
+    assert plan.lose(mask(stands), able, out) is bearing
+    assert plan.absence.legs.tolist() == mask(stands).tolist()
 
 
 @pytest.mark.parametrize("absent", [(LF,), (LM,), (LF, RR)])

@@ -309,6 +309,8 @@ static const hxControllerDefinition default_definition = {
     .friction = 0.7,
     .servo.torque_continuous = 1.2,
     .servo.drag = 0.0,
+    .servo.torque_limit = 6.0,
+    .servo.goal_speed_max = 0.0,
 };
 
 void hx_controller_definition_default(hxControllerDefinition *definition) {
@@ -677,6 +679,8 @@ static const hxRange definition_ranges[] = {
     {"friction.mu", "", 0.0, 100.0, offsetof(hxControllerDefinition, friction), 0},
     {"servo.torque_continuous", "N.m", 1e-09, 100000000.0, offsetof(hxControllerDefinition, servo.torque_continuous), 0},
     {"servo.drag", "N.m.s/rad", 0.0, 1000000.0, offsetof(hxControllerDefinition, servo.drag), 0},
+    {"servo.torque_limit", "N.m", 1e-09, DBL_MAX, offsetof(hxControllerDefinition, servo.torque_limit), 0},
+    {"servo.goal_speed_max", "rad/s", -DBL_MAX, DBL_MAX, offsetof(hxControllerDefinition, servo.goal_speed_max), 0},
 };
 
 size_t hx_controller_definition_ranges(const hxRange **range) {

@@ -117,7 +117,7 @@ static void watch(const hxControllerModel *model, const hxControllerInput *input
                   hxControllerState *state) {
   hxPosture level;
   double force[HX_LEGS][3];
-  int lifted[HX_LEGS], lost[HX_LEGS];
+  int lifted[HX_LEGS], lost[HX_LEGS], bearing[HX_LEGS];
   memset(&level, 0, sizeof level);
   level.level = 1;
   hx_sense(input, &level, force);
@@ -126,8 +126,11 @@ static void watch(const hxControllerModel *model, const hxControllerInput *input
     lifted[k] = state->plan.paths.clock.swinging[k] && now->feet.rise[k] > 0.0;
   hx_health_step(&model->health, model->plan.planner.leg, input->angle, (const double (*)[3])force,
                  &state->output, lifted, &state->health);
-  for (int k = 0; k < HX_LEGS; ++k) lost[k] = hx_health_lost(&state->health, k);
-  if (!hx_walk_plan_lose(&model->plan, lost, &state->output, &state->plan)) return;
+  for (int k = 0; k < HX_LEGS; ++k) {
+    lost[k] = hx_health_lost(&state->health, k);
+    bearing[k] = hx_health_bearing(&state->health, k);
+  }
+  if (!hx_walk_plan_lose(&model->plan, lost, bearing, &state->output, &state->plan)) return;
   state->regait = 1;
   state->changing = state->back = 0;
 }

@@ -206,15 +206,27 @@ static inline int hx_walk_plan_ended(hxWalkPlan *plan) {
   return ended;
 }
 
-/* Takes lost legs out of service (C58). last: the last commands. Returns whether any is new. */
+/* Takes lost legs out of service (C58). Those that stand and are bearing, that is can bear a load,
+ * wait until no other leg swings. last: the last commands. Returns whether any is new. */
 static inline int hx_walk_plan_lose(const hxWalkPlanModel *model, const int lost[HX_LEGS],
-                                    const hxControllerOutput *last, hxWalkPlan *plan) {
+                                    const int bearing[HX_LEGS], const hxControllerOutput *last,
+                                    hxWalkPlan *plan) {
   hxGaitClock *clock = &plan->paths.clock;
-  if (!hx_absence_change(&model->absent, lost, last, &plan->absence)) return 0;
-  memcpy(clock->absent, plan->absence.legs, sizeof clock->absent);
-  hx_gait_clock_drop(clock);
-  hx_walk_plan_end(plan);
-  return 1;
+  int gone[HX_LEGS], swings = 0, waits = 0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) swings |= clock->swinging[leg] && !lost[leg];
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const int stands = bearing[leg] && !clock->swinging[leg] && !plan->absence.legs[leg],
+              stays = lost[leg] && stands && swings && hx_absence_has_room(&plan->absence);
+    gone[leg] = lost[leg] && !stays;
+    waits |= stays;
+  }
+  const int new = hx_absence_change(&model->absent, gone, last, &plan->absence);
+  if (new || (waits && !hx_gait_clock_drops(clock))) {
+    memcpy(clock->absent, plan->absence.legs, sizeof clock->absent);
+    hx_gait_clock_drop(clock);
+    hx_walk_plan_end(plan);
+  }
+  return new;
 }
 
 /* Goes on with the standing feet and the command in another gait (C55). before: the model of the
@@ -224,8 +236,7 @@ static HX_SELDOM void hx_walk_plan_adopt(hxWalkPlanModel *model, const hxWalkPla
   hx_command_ramp_carry(&model->ramp, &before->ramp, &plan->ramp);
   if (back >= 0) hx_absence_take_back(&model->absent, back, &plan->absence);
   memcpy(plan->paths.clock.absent, plan->absence.legs, sizeof plan->absence.legs);
-  hx_foot_paths_join(&model->paths, &plan->paths, &hx_walk_plan_step(plan, 0)->feet, &model->absent,
-                     &plan->absence, back);
+  hx_foot_paths_join(&model->paths, &plan->paths, &hx_walk_plan_step(plan, 0)->feet, back);
   plan->has_after = 0;
   plan->at = 0;
   plan->last = INT64_MAX;

@@ -147,20 +147,23 @@ static inline void replace_forces(const hxComplianceModel *model, const hxLoadPl
 
 /* Decides which sensors are trusted (C34). When the sensors of three feet are not, none is. met:
  * heights at which the feet meet the ground without a bump [m]; force: that the laws use; reported:
- * sum of the normal forces that the sensors report [N]. */
+ * normal forces that the sensors report [N]. */
 static inline void judge_sensors(const hxComplianceModel *model, const hxLoadPlan *plan,
                                  const double met[HX_LEGS], const double force[HX_LEGS][3],
-                                 double reported, hxCompliance *laws) {
+                                 const double reported[HX_LEGS], hxCompliance *laws) {
   int high[HX_LEGS], due[HX_LEGS], count = 0, fresh = 0;
-  double total[HX_LEGS], known = 0.0;
+  double total[HX_LEGS], whole = 0.0, known = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
+    whole += reported[leg];
     high[leg] = plan->height[leg] > model->high + met[leg];
     due[leg] = plan->standing[leg] || plan->awaited[leg];
     const double most = hx_larger(model->share, likely * laws->scale * plan->shares.normal[leg]);
     known += laws->doubted[leg] && !high[leg] ? hx_smaller(force[leg][2], most) : 0.0;
   }
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    total[leg] = laws->doubted[leg] ? reported : reported + known;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    total[leg] = laws->doubted[leg] ? whole : whole + known;
+    if (high[leg]) total[leg] = whole + known - reported[leg];
+  }
   hx_sensor_watch_look(&model->watch, laws->felt, total, due, high, &laws->watch);
   for (int leg = 0; leg < HX_LEGS; ++leg) count += laws->watch.left[leg] > 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -194,7 +197,7 @@ static inline void meet_ground(const hxComplianceModel *model, const hxLoadPlan 
 
 /* Decides between a wrong sensor and ground that is met early or late; as for judge_sensors. */
 static inline void examine_contacts(const hxComplianceModel *model, const hxLoadPlan *plan,
-                                    const double force[HX_LEGS][3], double reported,
+                                    const double force[HX_LEGS][3], const double reported[HX_LEGS],
                                     hxCompliance *laws) {
   double met[HX_LEGS];
   hx_landings_expected(&laws->landings, laws->touching, plan->height, plan->swinging, met);
@@ -357,10 +360,10 @@ static inline int hx_compliance_waits(const hxComplianceModel *model, const int 
  * where a sensor is not trusted. */
 static inline void hx_compliance_step(const hxComplianceModel *model, const hxLoadPlan *plan,
                                       double force[HX_LEGS][3], hxCompliance *laws) {
-  double normal[HX_LEGS], reported = 0.0;
-  for (int leg = 0; leg < HX_LEGS; ++leg) normal[leg] = force[leg][2];
-  hx_contact_detector_step(model->weight, normal, laws->felt);
-  for (int leg = 0; leg < HX_LEGS; ++leg) reported += laws->felt[leg] ? normal[leg] : 0.0;
+  double normal[HX_LEGS], reported[HX_LEGS];
+  for (int leg = 0; leg < HX_LEGS; ++leg) reported[leg] = force[leg][2];
+  hx_contact_detector_step(model->weight, reported, laws->felt);
+  for (int leg = 0; leg < HX_LEGS; ++leg) reported[leg] *= laws->felt[leg] ? 1.0 : 0.0;
   replace_forces(model, plan, force, laws);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     laws->carrying[leg] = laws->touching[leg] && force[leg][2] > carrying_share * model->share;

@@ -10,6 +10,7 @@ typedef struct hxHealthModel {
   double drag;      /* N m s/rad  that the speed takes from their torque */
   double rotor;     /* kg m2, inertia at the joint */
   double most;      /* N m, largest torque */
+  double way;       /* rad, by which a firmware leads its servo in a period at most */
   double period;    /* s */
 } hxHealthModel;
 
@@ -17,6 +18,7 @@ typedef struct hxHealth {
   double strange[HX_LEGS][HX_JOINTS]; /* s, of unexplained torque, with its sign */
   double still[HX_LEGS][HX_JOINTS];   /* s, for which the joint has not moved */
   double proof[HX_LEGS][HX_JOINTS];   /* s, for which the servo has seemed to work */
+  double goal[HX_LEGS][HX_JOINTS];    /* rad, to which the firmware has led its servo */
   double angle[HX_LEGS][HX_JOINTS];   /* rad, measured at the last step */
   double speed[HX_LEGS][HX_JOINTS];   /* rad/s, in the period before it */
   int begun;                          /* there was one */
@@ -38,7 +40,9 @@ static inline void hx_health_compile(const hxControllerDefinition *definition,
   model->stiffness = definition->servo.kp;
   model->drag = definition->servo.drag;
   model->rotor = definition->servo.rotor_inertia;
-  model->most = definition->gains.limits.torque;
+  model->most = hx_smaller(definition->gains.limits.torque, definition->servo.torque_limit);
+  const double way = definition->servo.goal_speed_max * definition->period;
+  model->way = way > 0.0 ? way : INFINITY;
   model->period = definition->period;
 }
 
@@ -78,8 +82,9 @@ static inline void judge(double period, double excess, int rests, int leg, int j
 }
 
 /* Judges the servos by a period under a command. angle: measured at its end [rad]; force: of the
- * ground on the feet, torso axes [N]; lifted: feet that their legs lift, which bear none to all of
- * the force: a stuck sensor, or a stone in the way of the leg. */
+ * ground on the feet, torso axes [N], of which no more counts than the servo can carry; lifted:
+ * feet that their legs lift, which bear none to all of the force: a stuck sensor, or a stone in the
+ * way of the leg. */
 static inline void hx_health_step(const hxHealthModel *model, const hxLegSolver leg[HX_LEGS],
                                   const double angle[HX_LEGS][HX_JOINTS],
                                   const double force[HX_LEGS][3], const hxControllerOutput *command,
@@ -91,13 +96,17 @@ static inline void hx_health_step(const hxHealthModel *model, const hxLegSolver 
       const double now = angle[k][joint], before = health->begun ? health->angle[k][joint] : now,
                    speed = (now - before) / model->period, speed_max = leg[k].speed_max,
                    speed_ref = command->speed_ref[k][joint],
-                   reached = command->angle_ref[k][joint] +
-                             model->period * hx_clamp(speed_ref, -speed_max, speed_max),
+                   asked = command->angle_ref[k][joint] +
+                           model->period * hx_clamp(speed_ref, -speed_max, speed_max),
+                   led = health->begun ? health->goal[k][joint] : asked,
+                   goal = hx_clamp(asked, led - model->way, led + model->way),
+                   needed = hx_clamp(load[joint], -model->most, model->most),
                    excess = unexplained(model, speed_max, health->speed[k][joint], speed, speed_ref,
-                                        reached - now, command->torque_ref[k][joint], load[joint],
-                                        lifted[k] ? 0.0 : load[joint]);
+                                        goal - now, command->torque_ref[k][joint], needed,
+                                        lifted[k] ? 0.0 : needed);
       judge(model->period, excess, fabs(now - before) < still_speed * model->period, k, joint,
             health);
+      health->goal[k][joint] = goal;
       health->angle[k][joint] = now;
       health->speed[k][joint] = speed;
     }
@@ -108,6 +117,12 @@ static inline void hx_health_step(const hxHealthModel *model, const hxLegSolver 
 /* Returns whether some servo of a leg does not work. */
 static inline int hx_health_lost(const hxHealth *health, int leg) {
   return health->faulty[leg][0] || health->faulty[leg][1] || health->faulty[leg][2];
+}
+
+/* Returns whether a leg can bear a load: neither femur nor tibia is limp. */
+static inline int hx_health_bearing(const hxHealth *health, int leg) {
+  const int *faulty = health->faulty[leg], *locked = health->locked[leg];
+  return (!faulty[1] || locked[1]) && (!faulty[2] || locked[2]);
 }
 
 #endif

@@ -36,11 +36,8 @@ static const double sliding_drag = 0.55;
 static const double calm_cycles = 0.5;
 static const double sliding_time = 0.04; /* s, longer than a foot skids at touch-down */
 static const double trusted = 0.99;      /* 1, so near to its goal the trust is at it */
-/* s, a force of this duration on a foot in mid-swing is a contradiction */
-static const double airborne_time = 0.06;
-/* s, no force for this time on a foot that should carry load is a contradiction; both exceed the
- * delay of the sensors */
-static const double absent_time = 0.10;
+/* s, longest plausible contradiction, which exceeds the delay of the sensors */
+static const double contradiction_time = 0.10;
 static const double missing_share = 0.92; /* 1  of the weight */
 static const double memory_cycles = 1.5;  /* 1  gait cycles */
 /* 1, of the weight: as touch_share and lift_share, for a doubted foot; more, because torso and feet
@@ -96,19 +93,20 @@ static inline int hx_sensor_watch_busy(const hxSensorWatch *watch) {
   return busy;
 }
 
-/* Advances by one period. touching: feet that report a force; total: the sum of all normal forces,
- * for each foot [N]; standing: planned to carry their whole share; high: planned well above the
- * ground. */
+/* Advances by one period. touching: feet that report a force; total: for each foot the sum of all
+ * normal forces, without its own if it is high [N]; standing: planned to carry their whole share;
+ * high: planned well above the ground. */
 static inline void hx_sensor_watch_look(const hxSensorWatchModel *model,
                                         const int touching[HX_LEGS], const double total[HX_LEGS],
                                         const int standing[HX_LEGS], const int high[HX_LEGS],
                                         hxSensorWatch *watch) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int up = high[leg], missing = total[leg] < model->missing;
-    const int wrong = (touching[leg] && up) || (missing && standing[leg] && !touching[leg]);
+    const int up = high[leg], lacking = total[leg] < model->missing;
+    const int wrong = up ? touching[leg] && !lacking : standing[leg] && !touching[leg] && lacking;
     watch->contradicted[leg] = wrong ? watch->contradicted[leg] + model->period : 0.0;
-    const int too_long = watch->contradicted[leg] > (up ? airborne_time : absent_time);
-    watch->left[leg] = too_long ? model->memory : fmax(watch->left[leg] - model->period, 0.0);
+    watch->left[leg] = watch->contradicted[leg] > contradiction_time
+                           ? model->memory
+                           : fmax(watch->left[leg] - model->period, 0.0);
   }
 }
 

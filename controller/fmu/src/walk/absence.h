@@ -124,6 +124,13 @@ HX_SELDOM static void set_absent(const hxAbsenceModel *model, const int legs[HX_
   absence->since = 0;
 }
 
+/* Returns whether another leg may be taken out of service. */
+static inline int hx_absence_has_room(const hxAbsence *absence) {
+  int count = 0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) count += absence->legs[leg];
+  return count < HX_MOST_ABSENT;
+}
+
 /* Takes lost legs out of service, HX_MOST_ABSENT at most. Returns whether any is new. */
 static inline int hx_absence_change(const hxAbsenceModel *model, const int lost[HX_LEGS],
                                     const hxControllerOutput *last, hxAbsence *absence) {

@@ -52,7 +52,6 @@ static const double home_tolerance = 1e-9;
 static const double nearly_done = 1e-12; /* 1   floor of 1 - s */
 /* 1/s, m/s, downwards, of feet that end their swings at once */
 static const double drop_rate = 10.0, landing_speed = 0.08;
-static const int to_the_left[HX_LEGS] = {0, 1, 2, 5, 4, 3}; /* the legs around the robot */
 
 static inline void hx_foot_paths_compile(const hxControllerDefinition *definition,
                                          const hxLegSolver leg[HX_LEGS], hxFootPathsModel *model) {
@@ -255,57 +254,12 @@ HX_SELDOM static double farthest(const hxFootPathsModel *model, const hxFootPath
   return largest;
 }
 
-/* Returns how far a point is inside the polygon of the feet of the legs that stand [m], < 0
- * outside. */
-HX_SELDOM static double inside(const hxPlane feet[HX_LEGS], const int stands[HX_LEGS],
-                               hxPlane point) {
-  double least = INFINITY;
-  for (int k = 0; k < HX_LEGS; ++k) {
-    int next = (k + 1) % HX_LEGS;
-    if (!stands[to_the_left[k]]) continue;
-    while (!stands[to_the_left[next]]) next = (next + 1) % HX_LEGS;
-    const hxPlane corner = hx_plane_sub(feet[to_the_left[k]], point),
-                  side = hx_plane_sub(hx_plane_sub(feet[to_the_left[next]], point), corner);
-    least = hx_smaller(hx_across(corner, side) / hx_length(side), least);
-  }
-  return least;
-}
-
-/* Returns the least distance of the torso within its support in the coming steps [m] (C58). feet,
- * begin: as for farthest(). */
-HX_SELDOM static double steadiness(const hxFootPathsModel *model, const hxFootPaths *paths,
-                                   const hxPlannedFeet *feet, const double begin[HX_LEGS],
-                                   const hxAbsenceModel *absent, const hxAbsence *absence) {
-  double lift[HX_LEGS], least = INFINITY;
-  for (int leg = 0; leg < HX_LEGS; ++leg) lift[leg] = lift_off(model, begin[leg]);
-  for (int i = 0; i < 2 * HX_LEGS; ++i) { /* lift-off and touch-down of each leg */
-    const int swings = i / 2;
-    const double time = lift[swings] + (i % 2 ? model->swing_time : 0.0);
-    hxPlane place[HX_LEGS];
-    int stands[HX_LEGS];
-    if (paths->clock.absent[swings]) continue;
-    for (int leg = 0; leg < HX_LEGS; ++leg) {
-      const hxPlane p = feet->plane[leg], motion = ground_motion(feet, leg);
-      const hxPlane ahead =
-          hx_plane_add(aims(model, paths, leg), hx_scaled(motion, model->landing_lead + lift[leg]));
-      place[leg] =
-          hx_plane_sub(time < lift[leg] + model->swing_time ? p : ahead, hx_scaled(motion, time));
-      stands[leg] = leg != swings && !paths->clock.absent[leg];
-    }
-    const double steps = nearbyint(time / model->period);
-    const hxPlane torso = hx_absence_torso(absent, absence, (int64_t)steps);
-    least = hx_smaller(inside((const hxPlane *)place, (const int *)stands, torso), least);
-  }
-  return least;
-}
-
 /* Begins the walk anew with feet that stand under a moving body (C55): sets the phases of the legs
  * in the model so that one leg begins to give up its load, the first of those with which the
- * farthest foot goes least far. Without a leg, the torso stays as far within its support as it can.
- * A leg that is back in service (-1: none) begins in the middle of its swing instead (C58). */
+ * farthest foot goes least far. A leg that is back in service (-1: none) begins in the middle of
+ * its swing instead (C58). */
 static HX_SELDOM void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *paths,
-                                         hxPlannedFeet *feet, const hxAbsenceModel *absent,
-                                         const hxAbsence *absence, int back) {
+                                         hxPlannedFeet *feet, int back) {
   hxGaitClockModel *clock = &model->clock;
   const double unloads = hx_gait_clock_unloads(clock);
   const double *offset = clock->gait_offset;
@@ -314,8 +268,6 @@ static HX_SELDOM void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *p
     rest(model, feet->plane, paths, feet);
     return;
   }
-  int some = 0;
-  for (int leg = 0; leg < HX_LEGS; ++leg) some |= paths->clock.absent[leg];
   if (back >= 0) {
     for (int leg = 0; leg < HX_LEGS; ++leg)
       begin[leg] = 0.5 + 0.5 * clock->duty + offset[leg] - offset[back];
@@ -324,8 +276,7 @@ static HX_SELDOM void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *p
   for (int first = 0; back < 0 && first < HX_LEGS; ++first) {
     if (paths->clock.absent[first]) continue;
     for (int leg = 0; leg < HX_LEGS; ++leg) begin[leg] = unloads + (offset[leg] - offset[first]);
-    const double far = some ? -steadiness(model, paths, feet, begin, absent, absence)
-                            : farthest(model, paths, feet, begin);
+    const double far = farthest(model, paths, feet, begin);
     if (far >= least - same_distance) continue;
     least = far;
     hx_gait_clock_start_at(clock, begin);

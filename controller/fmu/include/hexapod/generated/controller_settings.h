@@ -198,6 +198,11 @@ typedef struct hxControllerDefinition {
     /* N.m.s/rad  Torque that the joint's speed takes from a command: back-EMF and viscous friction
      * */
     double drag;
+    /* N.m  Torque that a servo gives at rest, within the current that its firmware allows */
+    double torque_limit;
+    /* rad/s  Speed at which a servo's firmware leads its joint to a commanded angle at most; 0: at
+     * once */
+    double goal_speed_max;
   } servo;
   /* m/s2  Acceleration of free fall, world axes */
   double gravity[3];
