@@ -240,7 +240,8 @@ class FootPaths(Stateful):
         """Begins the walk anew with feet that stand under a moving body (C55).
 
         One leg begins to give up its load: the first of those with which the farthest foot goes
-        least far. A leg that is back in service instead begins in the middle of its swing (C58).
+        least far; the one opposite a leg out of service (C58), where the torso is not over the
+        others yet. A leg that is back in service instead begins in the middle of its swing.
         """
         clock = self.clock
         if not clock.walking:
@@ -249,7 +250,9 @@ class FootPaths(Stateful):
         unloads, offset = clock.unloads, np.array(self.gait.offsets)
         if back is not None:
             clock.start_at(0.5 + 0.5 * self.gait.duty + offset - offset[back])
-        for first in np.flatnonzero(~clock.absent) if back is None else ():
+        opposite = clock.absent[::-1] & ~clock.absent
+        able = opposite if opposite.any() else ~clock.absent
+        for first in np.flatnonzero(able) if back is None else ():
             begin = unloads + (offset - offset[first])
             far = self._farthest(feet, begin)
             if far < least - SAME_DISTANCE:

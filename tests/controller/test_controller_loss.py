@@ -12,6 +12,7 @@ from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Meas
 from hexapod_cosim.controller.plane import LEGS, Mask
 from hexapod_cosim.controller.sense.health import PROOF_TIME, STRANGE_TIME, Health
 from hexapod_cosim.controller.walk.absence import BACK_TIME, SHIFT_TIME, Absence, gait_without
+from hexapod_cosim.controller.walk.foot_paths import FootPaths
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot, load_robot
 
@@ -286,3 +287,17 @@ def test_a_leg_that_does_not_move_is_folded_and_comes_back_without_a_jump(law: s
     assert steps[gone[0] - 1 : gone[0] + 100].max() < 0.05
     assert steps[gone[-1] - 100 : gone[-1] + 100].max() < 0.05
     assert controller.gait == make_gait(ROBOT)
+
+
+@pytest.mark.parametrize(("absent", "first"), [((LF,), RR), ((LM,), 4), ((LM, RR), None)])
+def test_the_leg_opposite_a_lost_one_steps_first(
+    absent: tuple[int, ...], first: int | None
+) -> None:
+    """Opposite legs are LF and RR, LM and RM, LR and RF; two lost legs have two opposite ones."""
+    gait = gait_without(make_gait(ROBOT), mask(*absent), backwards=False)
+    paths = FootPaths(gait, SOLVER.forward(ROBOT.stance), period=H)
+    feet = paths.reset()
+    paths.clock.walking, paths.clock.absent = True, mask(*absent)
+    paths.join(feet)
+    until = (gait.duty + 1e-6 - paths.clock.phase_after(0)) % 1.0  # cycles    to the lift-off
+    assert int(np.argmin(np.where(mask(*absent), np.inf, until))) in first

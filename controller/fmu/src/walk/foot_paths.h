@@ -268,13 +268,17 @@ static HX_SELDOM void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *p
     rest(model, feet->plane, paths, feet);
     return;
   }
+  int opposite = 0;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    opposite |= paths->clock.absent[HX_LEGS - 1 - leg] && !paths->clock.absent[leg];
   if (back >= 0) {
     for (int leg = 0; leg < HX_LEGS; ++leg)
       begin[leg] = 0.5 + 0.5 * clock->duty + offset[leg] - offset[back];
     hx_gait_clock_start_at(clock, begin);
   }
   for (int first = 0; back < 0 && first < HX_LEGS; ++first) {
-    if (paths->clock.absent[first]) continue;
+    const int *absent = paths->clock.absent;
+    if (absent[first] || (opposite && !absent[HX_LEGS - 1 - first])) continue;
     for (int leg = 0; leg < HX_LEGS; ++leg) begin[leg] = unloads + (offset[leg] - offset[first]);
     const double far = farthest(model, paths, feet, begin);
     if (far >= least - same_distance) continue;
