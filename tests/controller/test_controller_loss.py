@@ -289,9 +289,9 @@ def test_a_leg_that_does_not_move_is_folded_and_comes_back_without_a_jump(law: s
     assert controller.gait == make_gait(ROBOT)
 
 
-@pytest.mark.parametrize(("absent", "first"), [((LF,), RR), ((LM,), 4), ((LM, RR), None)])
+@pytest.mark.parametrize(("absent", "first"), [((LF,), (RR,)), ((LM,), (4,)), ((LM, RR), (4, LF))])
 def test_the_leg_opposite_a_lost_one_steps_first(
-    absent: tuple[int, ...], first: int | None
+    absent: tuple[int, ...], first: tuple[int, ...]
 ) -> None:
     """Opposite legs are LF and RR, LM and RM, LR and RF; two lost legs have two opposite ones."""
     gait = gait_without(make_gait(ROBOT), mask(*absent), backwards=False)
