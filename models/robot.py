@@ -23,7 +23,7 @@ from typing import Any
 from hexapod_cosim.models.arrays import Vector3, Vector6
 from hexapod_cosim.models.contact.law import Contact
 from hexapod_cosim.models.errors import RobotError, refuse_path, unknown_name
-from hexapod_cosim.models.files import read_text
+from hexapod_cosim.models.files import parse_toml, read_text, reading_toml
 from hexapod_cosim.models.friction import Friction
 from hexapod_cosim.models.ground.table import beside, read_terrain
 from hexapod_cosim.models.records import (
@@ -46,9 +46,7 @@ from hexapod_cosim.models.schema import (
     Vector,
     expect_table,
     missing_key,
-    parse_toml,
     read_given,
-    reading_toml,
     refuse_unknown_keys,
     require,
 )

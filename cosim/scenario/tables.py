@@ -17,9 +17,8 @@ from hexapod_cosim.cosim.scenario.controls import LAW, control_beside
 from hexapod_cosim.cosim.scenario.records import KEYS, SECTIONS
 from hexapod_cosim.models import ScenarioError, unknown_name
 from hexapod_cosim.models.errors import refuse_path
-from hexapod_cosim.models.files import read_text
+from hexapod_cosim.models.files import parse_toml, read_text, reading_toml
 from hexapod_cosim.models.ground.table import beside
-from hexapod_cosim.models.schema import parse_toml, reading_toml
 
 POINTED = re.compile(r"[+-]?(?:\d+\.|\.\d+)(?:[eE][+-]?\d+)?")  # .1 or 1.
 

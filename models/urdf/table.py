@@ -18,7 +18,7 @@ import numpy as np
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.law import Contact
 from hexapod_cosim.models.errors import RobotError
-from hexapod_cosim.models.files import read_bytes
+from hexapod_cosim.models.files import merged_tables, read_bytes
 from hexapod_cosim.models.friction import Friction
 from hexapod_cosim.models.ground.table import beside, patch_specs, read_keys, terrain_specs
 from hexapod_cosim.models.kinematics import axis_rotation
@@ -44,7 +44,6 @@ from hexapod_cosim.models.schema import (
     Text,
     Vector,
     expect_table,
-    merged_tables,
     read_given,
     refuse_unknown_keys,
     specs,

@@ -33,7 +33,7 @@ from hexapod_cosim.extensions.live.settings import (
     live_scenario,
 )
 from hexapod_cosim.models import HexapodError, load_robot
-from hexapod_cosim.models.schema import parse_toml
+from hexapod_cosim.models.files import parse_toml
 
 WALK, STAND = BodyCommand(vx=0.08), BodyCommand()
 ANGLES = joint_names("angle_ref")

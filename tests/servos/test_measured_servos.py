@@ -30,10 +30,11 @@ from hexapod_cosim.models.dynamics import (
     constraints,
     external_torques,
 )
+from hexapod_cosim.models.files import parse_toml
 from hexapod_cosim.models.integrator import Start, start_state, try_step
 from hexapod_cosim.models.kinematics import body_states, joint_models
 from hexapod_cosim.models.records import Servo
-from hexapod_cosim.models.schema import parse_toml, require
+from hexapod_cosim.models.schema import require
 from hexapod_cosim.models.servos.motor import (
     Power,
     electrical_power,
