@@ -1,5 +1,5 @@
-"""Defines the integration methods by their coefficients: explicit Runge-Kutta and linearly implicit
-Rosenbrock-W.
+"""Defines the integrator's settings, and its methods by their coefficients: explicit Runge-Kutta
+and linearly implicit Rosenbrock-W.
 
 plant_fmu/src/method.c contains the same coefficients.
 """
@@ -9,12 +9,35 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.schema import Choice, Number
+
+PROJECTIONS = ("none", "step")
 
 Stage = Callable[[float, Array, Array], Array]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Baumgarte:
+    """Baumgarte stabilisation of the constraints (eq. 1)."""
+
+    alpha: Annotated[float, Number("1/s", at_least=0.0)]
+    beta: Annotated[float, Number("1/s", at_least=0.0)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solver:
+    """Settings of the integrator."""
+
+    method: Annotated[str, Choice(METHODS)]
+    step: Annotated[float, Number("s", at_least=0.0)]  # 0: error control
+    tolerance: Annotated[float, Number("1", above=0.0, below=1.0)]
+    step_max: Annotated[float, Number("s", above=0.0)]
+    projection: Annotated[str, Choice(PROJECTIONS)] = "none"
 
 
 @dataclass(frozen=True)
@@ -125,3 +148,4 @@ METHOD: dict[str, Method] = {
         e=[71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40],
     ),
 }
+METHODS = tuple(METHOD)

@@ -21,23 +21,21 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.models.arrays import Vector3, Vector6
-from hexapod_cosim.models.contact.law import Contact
+from hexapod_cosim.models.contact.law import BodyContact, Contact
 from hexapod_cosim.models.errors import RobotError, refuse_path, unknown_name
 from hexapod_cosim.models.files import parse_toml, read_text, reading_toml
 from hexapod_cosim.models.friction import Friction
+from hexapod_cosim.models.ground.surface import Terrain
 from hexapod_cosim.models.ground.table import beside, read_terrain
 from hexapod_cosim.models.records import (
     JOINT_NAMES,
     LEG_NAMES,
-    BodyContact,
     Foot,
     JointNames,
     Leg,
     Link,
     Robot,
     Servo,
-    Soil,
-    Terrain,
     Torso,
 )
 from hexapod_cosim.models.schema import (
@@ -51,7 +49,7 @@ from hexapod_cosim.models.schema import (
     require,
 )
 from hexapod_cosim.models.servos.presets import servo_table
-from hexapod_cosim.models.soil.presets import soil_table
+from hexapod_cosim.models.soil.presets import Soil, soil_table
 from hexapod_cosim.models.urdf.table import SECTIONS, element_named, side_table, urdf_table
 from hexapod_cosim.models.validation import check_robot
 

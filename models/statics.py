@@ -38,7 +38,8 @@ from hexapod_cosim.models.kinematics import (
     quaternion_product,
     rotation_matrix,
 )
-from hexapod_cosim.models.records import Baumgarte, Gait, Robot, Solver
+from hexapod_cosim.models.method import Baumgarte, Solver
+from hexapod_cosim.models.records import Gait, Robot
 
 RESIDUAL = 1e-9  # N, N m  about 1e4 times the rounding of such forces
 ITERATIONS = 60

@@ -34,7 +34,7 @@ from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Neighbours
 from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.models import ReachError, Robot
-from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.arrays import Array
 
 PHASES = 24  # moments of a gait cycle at which loads are computed
 STEPS = 60  # periods of the cycle whose joint angles and speeds are checked

@@ -40,7 +40,7 @@ from hexapod_cosim.cosim.scenario.reach import reaches
 from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.cosim.scenario.records import CHOSEN, DESIGNED, OWN, Command, Scenario
 from hexapod_cosim.models import ReachError, Robot, ScenarioError, Servo, load_robot
-from hexapod_cosim.models.records import Vector3
+from hexapod_cosim.models.arrays import Vector3
 
 CHOSEN_GAIT = "amble"  # of compliant control
 FOOTING = 0.4  # 1    of the way to the stance of least heat by which feet move to the hips

@@ -45,8 +45,8 @@ from hexapod_cosim.cosim.scenario.sections import (
 from hexapod_cosim.cosim.scenario.tables import read_tables, with_overrides
 from hexapod_cosim.models import Robot, ScenarioError, load_robot
 from hexapod_cosim.models.ground.faces import ground_normal
+from hexapod_cosim.models.ground.surface import Terrain
 from hexapod_cosim.models.ground.table import merged_terrain
-from hexapod_cosim.models.records import Terrain
 from hexapod_cosim.models.schema import (
     Number,
     expect_table,

@@ -36,7 +36,7 @@ from hexapod_cosim.cosim.scenario.records import (
 )
 from hexapod_cosim.models import RobotError, ScenarioError
 from hexapod_cosim.models.ground.table import read_keys
-from hexapod_cosim.models.records import Servo, Soil
+from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.schema import (
     Choice,
     expect_table,
@@ -46,7 +46,7 @@ from hexapod_cosim.models.schema import (
     specs,
 )
 from hexapod_cosim.models.servos.presets import servo_table
-from hexapod_cosim.models.soil.presets import soil_table
+from hexapod_cosim.models.soil.presets import Soil, soil_table
 
 # the parts of a gains file that a controller reads
 GAINS = {part: SECTIONS[part] for part in ("support", "hold", "limits", "paper")}

@@ -33,8 +33,9 @@ from hexapod_cosim.models.friction import Friction, bristle_rate, friction_force
 from hexapod_cosim.models.ground.blocks import TOP, Cell
 from hexapod_cosim.models.ground.faces import faces_of_feet, ground_face, surface_of
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, rotation_matrix
-from hexapod_cosim.models.records import Foot, Robot, Soil
+from hexapod_cosim.models.records import Foot, Robot
 from hexapod_cosim.models.soil.law import shear_force, shear_limit, shear_rate, soil_normal_force
+from hexapod_cosim.models.soil.presets import Soil
 
 NEAREST = "nearest"  # face of torso, knees and shanks
 

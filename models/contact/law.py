@@ -1,4 +1,5 @@
-"""Defines the normal contact laws: the data of a contact and its force with restitution (eq. 14).
+"""Defines what touches, and the normal contact laws: the data of a contact and its force with
+restitution (eq. 14).
 
 f_n = K delta^1.5 max(0, 1 + d ddelta). Touch-down fixes d [s/m] by the approach speed, and d holds
 until lift-off. Most laws have the form d = chi(e) / v0 and differ in chi(e).
@@ -11,7 +12,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated
 
-from hexapod_cosim.models.schema import Choice, Number
+from hexapod_cosim.models.arrays import Vector3
+from hexapod_cosim.models.schema import Choice, Number, Vector
+
+BODY_CONTACTS = ("off", "on")
+SELF_CONTACTS = ("off", "warn", "force")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +29,28 @@ class Contact:
     restitution: Annotated[float, Number("1", at_least=0.0, at_most=1.0)]
     damping_factor: Annotated[float, Number("s/m", at_least=0.0)]  # c of the constant law
     impact_speed_floor: Annotated[float, Number("m/s", above=0.0)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyContact:
+    """Spheres that touch the ground besides the feet; parts of size 0 do not.
+
+    The radii of knee and shank are also those of femur and tibia, as capsules, in the distances
+    between neighbouring legs, which do not depend on `contact`.
+    """
+
+    contact: Annotated[str, Choice(BODY_CONTACTS)] = "off"
+    # whether a run warns of neighbouring legs that overlap, or these push each other
+    self_contact: Annotated[str, Choice(SELF_CONTACTS)] = "off"
+    # half edges of a box along the torso's axes, with a sphere around each corner
+    torso_box: Annotated[Vector3, Vector("m", 3)] = (0.0, 0.0, 0.0)
+    # centre of the box, from the torso's origin
+    torso_centre: Annotated[Vector3, Vector("m", 3)] = (0.0, 0.0, 0.0)
+    corner_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
+    knee_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
+    shank_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
+    # of the shank's sphere: 0 at the tibia's joint, 1 at the foot's centre
+    shank_position: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.5
 
 
 # below it the closed form of _log_rest loses more digits than its series omits

@@ -32,8 +32,9 @@ from hexapod_cosim.models.ground.blocks import Cell, cell_at, outside
 from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.surface import LAW, MU, MU_STATIC, STIFFNESS
 from hexapod_cosim.models.kinematics import LEGS, foot_centres
-from hexapod_cosim.models.records import Robot, Soil
+from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.soil.law import plastic_depth, row_soil, soil_radius
+from hexapod_cosim.models.soil.presets import Soil
 
 LEAST_FOOTPRINT = 1e-6  # m  shallower ones are not recorded
 SAME_FACE = 1e-6  # m, 1  depth and normal of one contact at both sides of a border between cells

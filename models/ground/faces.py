@@ -16,8 +16,7 @@ from hexapod_cosim.models.ground.blocks import (
     cell_at,
 )
 from hexapod_cosim.models.ground.smooth import height_and_slopes, heights_at, smooth_distance
-from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import Terrain
+from hexapod_cosim.models.ground.surface import Surface, Terrain
 
 Face = tuple[float, Array]  # distance [m], positive above the ground, and unit normal (3,)
 

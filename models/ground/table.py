@@ -24,8 +24,7 @@ from hexapod_cosim.models.ground.patches import (
 )
 from hexapod_cosim.models.ground.rough import SMOOTH
 from hexapod_cosim.models.ground.steps import BLOCKS
-from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import PLANES, Terrain
+from hexapod_cosim.models.ground.surface import PLANES, Surface, Terrain
 from hexapod_cosim.models.schema import (
     Choice,
     Spec,

@@ -17,7 +17,8 @@ from collections.abc import Callable
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
-from hexapod_cosim.models.records import Foot, Soil
+from hexapod_cosim.models.records import Foot
+from hexapod_cosim.models.soil.presets import Soil
 
 REACHED = 1e-8  # m  short of the virgin curve: links are off their joints by less
 BISECTIONS = 200  # halvings of an interval, more than doubles resolve

@@ -16,26 +16,23 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
-from hexapod_cosim.models.contact.law import Contact
+from hexapod_cosim.models.contact.law import BodyContact, Contact
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.files import merged_tables, read_bytes
 from hexapod_cosim.models.friction import Friction
+from hexapod_cosim.models.ground.surface import Terrain
 from hexapod_cosim.models.ground.table import beside, patch_specs, read_keys, terrain_specs
 from hexapod_cosim.models.kinematics import axis_rotation
+from hexapod_cosim.models.method import Baumgarte, Solver
 from hexapod_cosim.models.records import (
     JOINT_NAMES,
     LEG_NAMES,
-    Baumgarte,
-    BodyContact,
     Foot,
     Gait,
     JointNames,
     Leg,
     Link,
     Servo,
-    Soil,
-    Solver,
-    Terrain,
     Torso,
 )
 from hexapod_cosim.models.schema import (
@@ -50,7 +47,7 @@ from hexapod_cosim.models.schema import (
     wrong_type,
 )
 from hexapod_cosim.models.servos.presets import servo_table
-from hexapod_cosim.models.soil.presets import soil_table
+from hexapod_cosim.models.soil.presets import Soil, soil_table
 from hexapod_cosim.models.urdf.assumed import (
     assume_gait,
     assume_servo,

@@ -11,8 +11,10 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
 from hexapod_cosim.models.arrays import Vector3
+from hexapod_cosim.models.contact.law import BodyContact
+from hexapod_cosim.models.ground.surface import Terrain
 from hexapod_cosim.models.ground.table import terrain_table
-from hexapod_cosim.models.records import JOINT_NAMES, BodyContact, Leg, Link, Robot, Terrain
+from hexapod_cosim.models.records import JOINT_NAMES, Leg, Link, Robot
 from hexapod_cosim.models.schema import specs
 from hexapod_cosim.models.urdf.elements import EXTENSION
 from hexapod_cosim.models.xml_elements import add, joined, text, written

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 
+from hexapod_cosim.models.contact.law import BodyContact
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.friction import LAWS, Friction
 from hexapod_cosim.models.ground.surface import LAW, Surface
 from hexapod_cosim.models.ground.valleys import tightest_valley
-from hexapod_cosim.models.records import BodyContact, Robot, Servo
+from hexapod_cosim.models.records import Robot, Servo
 
 # 1  least radius of valleys over that of a sphere in them; one nearest point needs 1, and the books
 # of energy close from 1.01 on

@@ -14,6 +14,7 @@ from plant import Plant, inputs, pointer
 from states import changed, distance, lopsided, random_bodies, random_command, random_pose
 
 from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.forces import contacts_of
 from hexapod_cosim.models.contact.geometry import standing_damping
 from hexapod_cosim.models.contact.pairs import clearances, leg_points, line_distance
@@ -25,7 +26,6 @@ from hexapod_cosim.models.contact.spheres import (
 )
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.kinematics import body_states
-from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.stage import keep_slopes, solve_stage
 
 DENSE = 1e-10  # relative: the error of the dense solution, whose condition number is about 1e6

@@ -15,6 +15,7 @@ from states import changed, distance, landing, lopsided, random_bodies, random_c
 
 from hexapod_cosim.models import METHODS, Robot, load_robot
 from hexapod_cosim.models.actuator import servo_slopes
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.integrator import (
@@ -28,7 +29,6 @@ from hexapod_cosim.models.integrator import (
 )
 from hexapod_cosim.models.kinematics import body_states, joint_angles, joint_speeds
 from hexapod_cosim.models.method import METHOD, Stage, method_step
-from hexapod_cosim.models.records import Array
 
 PLACES = 1e-14  # m, 1: some tens of roundings
 SPEEDS = 1e-11  # relative to the largest speed: the dense system of 204 unknowns loses four digits

@@ -13,6 +13,7 @@ import numpy as np
 from plant import Plant, inputs, pointer
 
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.geometry import (
     foot_contact,
     foot_contacts,
@@ -29,7 +30,6 @@ from hexapod_cosim.models.kinematics import (
     rotation_matrix,
     skew,
 )
-from hexapod_cosim.models.records import Array
 
 STEP = 1e-7  # step of the central differences in m, rad, m/s
 
