@@ -27,8 +27,9 @@ from hexapod_cosim.models.dynamics import (
     masses,
     world_inertias,
 )
-from hexapod_cosim.models.integrator import integrate, start_state
+from hexapod_cosim.models.integrator import integrate
 from hexapod_cosim.models.kinematics import body_states
+from hexapod_cosim.models.step import start_state
 
 DENSE = 1e-10  # relative: the error of the dense solution, whose condition number is about 1e6
 FORCES = 1e-12  # relative: rounding of forces
