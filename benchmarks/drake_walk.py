@@ -57,6 +57,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "support"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "build" / "typing"))  # `make typing`
 from mirror import JOINTS, LEGS, HxDefinition, HxInput
 
 Array = NDArray[np.float64]

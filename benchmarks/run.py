@@ -67,8 +67,6 @@ def main() -> None:
     tools = prepare(quick=quick)
     folder = BUILD / "quick" if quick else RESULTS / machine()
     folder.mkdir(parents=True, exist_ok=True)
-    facts = json.dumps(described(tools), indent=2)
-    (folder / "machine.json").write_text(f"{facts}\n", encoding="utf-8")
     series = [
         *_chosen(ours(), quick),
         *_chosen([one for one in peers() if command(one.engine, tools)], quick),
@@ -77,6 +75,10 @@ def main() -> None:
     files = {walk.name: write(walk) for walk in walks}
     bench = Bench(tools, files | _steep_files(walks))
     runs = measured(bench, series, [walk.name for walk in walks])
+    worked = {run.engine for run in runs if math.isfinite(run.seconds)}
+    tools.missing.update({one: bench.errors[one] for one in bench.errors if one not in worked})
+    facts = json.dumps(described(tools), indent=2)
+    (folder / "machine.json").write_text(f"{facts}\n", encoding="utf-8")
     _write_walks(folder, runs, series, tools)
     parts, scaling = measured_parts(bench, series, runs, walks, quick=quick)
     table = rows(runs, series, parts)

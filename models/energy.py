@@ -1,4 +1,4 @@
-"""Computes energies, momentum and constraint errors of all bodies."""
+"""Computes energies and momentum of all bodies."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from hexapod_cosim.models.actuator import stop_energy
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import constraints
 from hexapod_cosim.models.contact.forces import (
     candidates,
     contacts_at,
@@ -15,7 +16,6 @@ from hexapod_cosim.models.contact.forces import (
 from hexapod_cosim.models.contact.pairs import pair_contacts
 from hexapod_cosim.models.dynamics import (
     carried_turns,
-    constraints,
     joint_overruns,
     masses,
     spin_inertia,
@@ -73,9 +73,3 @@ def momentum(robot: Robot, body: Array) -> tuple[Array, Array]:
     for joint, size in zip(joint_models(robot), h, strict=True):
         about = about + size * (rotation_matrix(body[joint.parent, 3:7]) @ joint.s_i)
     return linear.sum(axis=0), about
-
-
-def constraint_errors(robot: Robot, body: Array) -> tuple[float, float]:
-    """Returns the norms of Phi [m or 1] and of its rate [m/s or 1/s]."""
-    joints = constraints(robot, body)
-    return float(np.linalg.norm(joints.phi)), float(np.linalg.norm(joints.dphi))

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import project
 from hexapod_cosim.models.contact.forces import Contacts, bristle_length
 from hexapod_cosim.models.contact.switching import (
     Depths,
@@ -29,11 +30,9 @@ from hexapod_cosim.models.kinematics import (
     BODIES,
     BODY_STATE,
     LEGS,
-    cross,
     joint_models,
     quaternion_product,
     quaternion_rate,
-    rotation_matrix,
 )
 from hexapod_cosim.models.method import METHOD, Method, method_step
 from hexapod_cosim.models.records import Robot
@@ -186,26 +185,6 @@ def frame_quaternion(x: Array, y: Array, z: Array) -> Array:
     K[1:, 1:] = R + R.T + (1.0 - np.trace(R)) * np.eye(3)
     p = K[int(np.argmax(np.diag(K)))]
     return np.asarray(p / np.linalg.norm(p))
-
-
-def project(robot: Robot, body: Array) -> Array:
-    """Returns the bodies (19, 13), projected onto their joints from hip to foot.
-
-    The smallest rotation aligns the axis, a translation restores the joint's point, and velocities
-    keep only the rotation about the axis.
-    """
-    body = body.copy()
-    for joint in joint_models(robot):
-        parent, child = body[joint.parent], body[joint.child]
-        R_i = rotation_matrix(parent[3:7])
-        s, z = R_i @ joint.s_i, rotation_matrix(child[3:7]) @ joint.s_j
-        turn = np.concatenate([[1.0 + z @ s], cross(z, s)])
-        child[3:7] = quaternion_product(turn / np.linalg.norm(turn), child[3:7])
-        child[10:13] = parent[10:13] + (s @ (child[10:13] - parent[10:13])) * s
-        sP_i, sP_j = R_i @ joint.point_i, rotation_matrix(child[3:7]) @ joint.point_j
-        child[0:3] = parent[0:3] + sP_i - sP_j
-        child[7:10] = parent[7:10] + cross(parent[10:13], sP_i) - cross(child[10:13], sP_j)
-    return body
 
 
 # touch-down

@@ -15,6 +15,7 @@ import numpy as np
 
 from hexapod_cosim.models.actuator import gear_drag, servo_slopes, servo_torque, stop_slopes
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import constraints
 from hexapod_cosim.models.contact.forces import (
     Candidate,
     Contacts,
@@ -35,7 +36,6 @@ from hexapod_cosim.models.dynamics import (
     Command,
     applied_forces,
     constraint_equations,
-    constraints,
     external_torques,
     gear_loads,
     joint_overruns,

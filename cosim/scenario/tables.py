@@ -18,7 +18,7 @@ from hexapod_cosim.cosim.scenario.records import KEYS, SECTIONS
 from hexapod_cosim.models import ScenarioError, unknown_name
 from hexapod_cosim.models.errors import refuse_path
 from hexapod_cosim.models.files import parse_toml, read_text, reading_toml
-from hexapod_cosim.models.ground.table import beside
+from hexapod_cosim.models.ground.table import terrain_beside
 
 POINTED = re.compile(r"[+-]?(?:\d+\.|\.\d+)(?:[eE][+-]?\d+)?")  # .1 or 1.
 
@@ -34,8 +34,7 @@ def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
         path, kind="scenario", name="the scenario", names=list_scenarios, error=ScenarioError
     ):
         table = parse_toml(read_text(path))
-    if isinstance(table.get("terrain"), dict):
-        table["terrain"] = beside(table["terrain"], path.parent)
+    table = terrain_beside(table, path.parent)
     refuse_path(str(table.get("robot", "")), "the robot file", ScenarioError)
     if "control" in table:
         table["control"] = control_beside(table["control"], path.parent)

@@ -195,13 +195,16 @@ def merged_terrain(own: Terrain, given: Mapping[str, Any], where: str) -> Terrai
     return read_terrain({"kind": own.name, **kept, **placed, **given}, where)
 
 
-def beside(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Returns [terrain] with its `file` as an absolute path, relative to a folder until then."""
-    file = table.get("file")
-    if not isinstance(file, str) or not file:
-        return dict(table)
+def terrain_beside(tables: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Returns a file's tables in which `file` of [terrain], relative to a folder until then, is an
+    absolute path.
+    """
+    terrain = tables.get("terrain")
+    file = terrain.get("file") if isinstance(terrain, Mapping) else None
+    if terrain is None or not isinstance(file, str) or not file:
+        return dict(tables)
     refuse_path(file, "the height map", RobotError)
-    return {**table, "file": str((folder / file).resolve())}
+    return {**tables, "terrain": {**terrain, "file": str((folder / file).resolve())}}
 
 
 def terrain_table(terrain: Terrain) -> dict[str, Any]:

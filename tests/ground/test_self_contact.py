@@ -17,12 +17,12 @@ from states import changed, distance, lopsided, random_command
 
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import constraints
 from hexapod_cosim.models.contact.forces import open_contacts, pair_wrenches, standing_pairs
 from hexapod_cosim.models.contact.pairs import clearances, leg_pairs, pair_contacts
 from hexapod_cosim.models.dynamics import (
     Command,
     accelerations,
-    constraints,
     mass_matrix,
     masses,
     world_inertias,

@@ -10,13 +10,12 @@ import pytest
 
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import constraints, joint_reactions
 from hexapod_cosim.models.dynamics import (
     Command,
     accelerations,
     applied_forces,
-    constraints,
     drive_acceleration,
-    joint_reactions,
     masses,
     world_inertias,
 )

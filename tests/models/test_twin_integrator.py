@@ -16,6 +16,7 @@ from states import changed, distance, landing, lopsided, random_bodies, random_c
 from hexapod_cosim.models import METHODS, Robot, load_robot
 from hexapod_cosim.models.actuator import servo_slopes
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import project
 from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.integrator import (
@@ -23,7 +24,6 @@ from hexapod_cosim.models.integrator import (
     cubic_crossing,
     error_norm,
     integrate,
-    project,
     start_state,
     step_factor,
 )

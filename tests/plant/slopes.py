@@ -14,13 +14,14 @@ from plant import Plant, inputs, pointer
 
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import constraints
 from hexapod_cosim.models.contact.geometry import (
     foot_contact,
     foot_contacts,
     foot_force,
     standing_damping,
 )
-from hexapod_cosim.models.dynamics import Command, constraints, joint_torques
+from hexapod_cosim.models.dynamics import Command, joint_torques
 from hexapod_cosim.models.kinematics import (
     body_states,
     cross,

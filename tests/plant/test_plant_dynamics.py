@@ -17,9 +17,10 @@ from states import changed, distance, lopsided, random_bodies, random_command
 
 from hexapod_cosim.models import CONTACT_LAWS, Robot, load_robot
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import constraints
 from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force, standing_damping
 from hexapod_cosim.models.contact.law import contact_damping
-from hexapod_cosim.models.dynamics import Command, accelerations, constraints, mass_matrix
+from hexapod_cosim.models.dynamics import Command, accelerations, mass_matrix
 from hexapod_cosim.models.kinematics import quaternion_rate, skew
 
 DENSE = 1e-10  # relative: the error of the dense solution, whose condition number is about 1e6

@@ -12,8 +12,9 @@ from states import changed, distance, lopsided, random_bodies
 from hexapod_cosim.models import CONTACT_LAWS, Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import joint_kinematics
 from hexapod_cosim.models.contact.law import contact_damping, exact_restitution_chi, normal_force
-from hexapod_cosim.models.dynamics import joint_kinematics, world_inertias
+from hexapod_cosim.models.dynamics import world_inertias
 from hexapod_cosim.models.kinematics import (
     body_states,
     joint_angle,
