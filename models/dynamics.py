@@ -16,13 +16,8 @@ import numpy as np
 from hexapod_cosim.models.actuator import gear_friction, overrun, servo_torque, stop_torque
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.constraints import MULTIPLIERS, Constraints, constraints
-from hexapod_cosim.models.contact.forces import (
-    Contacts,
-    contact_wrenches,
-    contacts_of,
-    standing_pairs,
-)
-from hexapod_cosim.models.contact.spheres import standing_body_damping
+from hexapod_cosim.models.contact.bodies import standing_body_damping, standing_pairs
+from hexapod_cosim.models.contact.forces import Contacts, contact_wrenches, contacts_of
 from hexapod_cosim.models.kinematics import (
     BODIES,
     JOINTS,

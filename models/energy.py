@@ -7,13 +7,13 @@ import numpy as np
 from hexapod_cosim.models.actuator import stop_energy
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.constraints import constraints
+from hexapod_cosim.models.contact.bodies import pair_contacts
 from hexapod_cosim.models.contact.forces import (
     candidates,
     contacts_at,
     open_contacts,
     shares_of_feet,
 )
-from hexapod_cosim.models.contact.pairs import pair_contacts
 from hexapod_cosim.models.dynamics import (
     carried_turns,
     joint_overruns,

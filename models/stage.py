@@ -19,11 +19,9 @@ from hexapod_cosim.models.constraints import constraints
 from hexapod_cosim.models.contact.forces import (
     Candidate,
     Contacts,
-    ContactState,
     closed_contacts,
     contact_bristle_rate,
     contacts_of,
-    has_bristles,
 )
 from hexapod_cosim.models.contact.geometry import (
     FootContact,
@@ -31,7 +29,7 @@ from hexapod_cosim.models.contact.geometry import (
     contact_matrices,
     slip_velocity,
 )
-from hexapod_cosim.models.contact.law import normal_force, normal_slopes
+from hexapod_cosim.models.contact.law import ContactState, normal_force, normal_slopes
 from hexapod_cosim.models.dynamics import (
     Command,
     applied_forces,
@@ -218,7 +216,7 @@ def sole_bristles(
     """Returns the bristles of all closed soles that have some."""
     found = []
     for k, point, state, contact in closed_contacts(robot, body, contacts):
-        if point.is_sole and has_bristles(state):
+        if point.is_sole and state.has_bristles:
             across = np.eye(3) - np.outer(contact.normal, contact.normal)
             T = across @ contact_jacobian(body, point.sphere.body, contact)
             rate = contact_bristle_rate(state, contact, bristle[point.leg])

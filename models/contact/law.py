@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from hexapod_cosim.models.arrays import Vector3
+from hexapod_cosim.models.friction import Friction
 from hexapod_cosim.models.schema import Choice, Number, Vector
+from hexapod_cosim.models.soil.presets import Soil
 
 BODY_CONTACTS = ("off", "on")
 SELF_CONTACTS = ("off", "warn", "force")
@@ -51,6 +53,32 @@ class BodyContact:
     shank_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
     # of the shank's sphere: 0 at the tibia's joint, 1 at the foot's centre
     shank_position: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.5
+
+
+@dataclass(frozen=True)
+class ContactState:
+    """State of a contact, which holds from touch-down to lift-off."""
+
+    contact: Contact  # with the stiffness of the ground where it touched down
+    friction: Friction
+    soil: Soil
+    damping: float = math.nan  # s/m  d of eq. 14; nan: open
+    impact_speed: float = 0.0  # m/s  at the last touch-down
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the sphere does not touch the face."""
+        return math.isnan(self.damping)
+
+    @property
+    def is_soft(self) -> bool:
+        """Whether the contact is on soil."""
+        return self.soil.law != "none"
+
+    @property
+    def has_bristles(self) -> bool:
+        """Whether a sole has bristles, those of friction or of shear in soil."""
+        return self.is_soft or self.friction.has_bristles
 
 
 # below it the closed form of _log_rest loses more digits than its series omits

@@ -15,7 +15,7 @@ from states import changed
 
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.arrays import Array
-from hexapod_cosim.models.contact.spheres import body_contacts
+from hexapod_cosim.models.contact.bodies import body_contacts
 from hexapod_cosim.models.dynamics import Command
 
 MACRO = 0.005  # s
