@@ -48,8 +48,10 @@ def parse_toml(text: str) -> dict[str, Any]:
     try:
         table = tomllib.loads(text)
         _check_size(table, DEEPEST)
-    except tomllib.TOMLDecodeError:
-        raise
+    except tomllib.TOMLDecodeError as error:
+        lines = text.split("\n")
+        end = f"at line {len(lines)}, column {len(lines[-1]) + 1}"
+        raise tomllib.TOMLDecodeError(str(error).replace("at end of document", end)) from error
     except RecursionError as error:
         raise tomllib.TOMLDecodeError(f"more than {DEEPEST} tables or arrays deep") from error
     except ValueError as error:  # thousands of digits
@@ -70,11 +72,15 @@ def decoding_toml(path: Path, *, kind: str, error: type[HexapodError]) -> Iterat
         yield
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as cause:
         other = _other_format(path)
-        what = "not a TOML file"
-        got = other or str(cause)
-        expected = "TOML 1.0 in UTF-8"
-        fix = "correct that line" if other is None else f"give the path of a {kind} file"
-        raise error(what, got=got, expected=expected, fix=fix, where=str(path)) from cause
+        what, place = _place_of(cause)
+        fix = f"correct it at {path}:{place}" if place else f"correct {path}"
+        raise error(
+            "not a TOML file",
+            got=other or what,
+            expected="TOML 1.0 in UTF-8",
+            fix=fix if other is None else f"give the path of a {kind} file",
+            where=str(path),
+        ) from cause
 
 
 @contextmanager
@@ -101,6 +107,15 @@ def reading_toml(
     except OSError as cause:
         fix = f"give the path of a {kind} file, or one of: " + ", ".join(names())
         raise error(f"cannot read {name}", got=cause.strerror, fix=fix, where=str(path)) from cause
+
+
+def _place_of(cause: tomllib.TOMLDecodeError | UnicodeDecodeError) -> tuple[str, str]:
+    """Returns what is wrong in a TOML file and where, as "LINE:COLUMN"; "" where it is unknown."""
+    if isinstance(cause, UnicodeDecodeError):
+        lines = cause.object[: cause.start].split(b"\n")
+        return str(cause), f"{len(lines)}:{len(lines[-1]) + 1}"
+    what, _, place = str(cause).partition(" (at line ")
+    return what, place.rstrip(")").replace(", column ", ":")
 
 
 def _other_format(path: Path) -> str | None:
