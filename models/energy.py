@@ -1,6 +1,8 @@
-"""Computes energies and momentum of all bodies."""
+"""Computes energies and momentum of all bodies, and the mobility of links and joints."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,12 +19,25 @@ from hexapod_cosim.models.contact.forces import (
 from hexapod_cosim.models.dynamics import (
     carried_turns,
     joint_overruns,
+    mass_matrix,
     masses,
     spin_inertia,
     world_inertias,
 )
-from hexapod_cosim.models.kinematics import joint_models, joint_speeds, rotation_matrix
+from hexapod_cosim.models.kinematics import (
+    BODIES,
+    JOINTS,
+    LEGS,
+    body_states,
+    joint_models,
+    joint_speeds,
+    rotation_matrix,
+)
 from hexapod_cosim.models.records import Robot
+
+UNKNOWNS = 6 + LEGS * JOINTS
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+ZERO = np.zeros((LEGS, JOINTS))  # rad, rad/s
 
 
 def kinetic_energy(robot: Robot, body: Array) -> float:
@@ -73,3 +88,40 @@ def momentum(robot: Robot, body: Array) -> tuple[Array, Array]:
     for joint, size in zip(joint_models(robot), h, strict=True):
         about = about + size * (rotation_matrix(body[joint.parent, 3:7]) @ joint.s_i)
     return linear.sum(axis=0), about
+
+
+def tibia_mobility(robot: Robot) -> float:
+    """Returns the acceleration of the tibias' centres of mass per force there [1/kg], MuJoCo's
+    invweight.
+
+    It is the mean over legs and directions, at angle 0.
+    """
+    J, M = _at_zero(robot)
+    tibias = J.reshape(BODIES, 6, UNKNOWNS)[JOINTS::JOINTS, :3].reshape(-1, UNKNOWNS)
+    return float(np.mean(np.sum(tibias * np.linalg.solve(M, tibias.T).T, axis=1)))
+
+
+def joint_mobility(robot: Robot) -> Array:
+    """Returns the accelerations (6, 3) of the joints per torque [1/(kg m2)], at angle 0."""
+    _, M = _at_zero(robot)
+    return np.diag(np.linalg.inv(M))[6:].reshape(LEGS, JOINTS)
+
+
+def _at_zero(robot: Robot) -> tuple[Array, Array]:
+    """Returns the bodies' motion per speed (114, 24) and the mass matrix (24, 24), at angle 0."""
+    J = np.stack(
+        [_motion(robot, speed).ravel() for speed in np.eye(UNKNOWNS)], axis=-1
+    )  # (114, 24)
+    body = body_states(robot, np.zeros(3), UPRIGHT, np.zeros(3), np.zeros(3), ZERO, ZERO)
+    plain = replace(robot, servo=replace(robot.servo, gear_ratio=0.0))
+    return J, np.asarray(J.T @ mass_matrix(plain, body) @ J)
+
+
+def _motion(robot: Robot, speed: Array) -> Array:
+    """Returns velocities and angular velocities (19, 6) of the bodies at angle 0.
+
+    speed (24,): the torso's (6,) and the joints' (18,).
+    """
+    return body_states(
+        robot, np.zeros(3), UPRIGHT, speed[:3], speed[3:6], ZERO, speed[6:].reshape(LEGS, JOINTS)
+    )[:, 7:13]

@@ -28,6 +28,7 @@ from hexapod_cosim.models.contact.geometry import (
     contact_jacobian,
     contact_matrices,
     slip_velocity,
+    turning_slopes,
 )
 from hexapod_cosim.models.contact.law import ContactState, normal_force, normal_slopes
 from hexapod_cosim.models.dynamics import (
@@ -43,7 +44,7 @@ from hexapod_cosim.models.dynamics import (
     stop_torques,
 )
 from hexapod_cosim.models.friction import friction_drag as foot_drag
-from hexapod_cosim.models.friction import friction_grip, turning_slopes
+from hexapod_cosim.models.friction import friction_grip
 from hexapod_cosim.models.kinematics import BODIES, JOINTS, LEGS, joint_angles, joint_speeds
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.servos.motor import friction_drag, has_measured_friction

@@ -1,5 +1,4 @@
-"""Computes the forces of all contacts with any ground, and defines their state, which holds from
-touch-down to lift-off.
+"""Computes the forces of all contacts with any ground, and defines their state.
 
 A foot touches the ground below it and, on blocks, up to three higher blocks beside it; torso, knees
 and shanks are the spheres of bodies.py. A closed contact keeps its damping (eq. 14) and the
@@ -28,9 +27,10 @@ from hexapod_cosim.models.contact.geometry import (
     contact_shares,
     slip_velocity,
     sphere_contact,
+    turning_moment,
 )
 from hexapod_cosim.models.contact.law import ContactState, normal_force
-from hexapod_cosim.models.friction import bristle_rate, friction_force, turning_moment
+from hexapod_cosim.models.friction import bristle_rate, friction_force
 from hexapod_cosim.models.ground.blocks import TOP, Cell
 from hexapod_cosim.models.ground.faces import faces_of_feet, ground_face, surface_of
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, rotation_matrix
