@@ -181,7 +181,7 @@ def chosen_controls(texts: Sequence[str], plan: Scenario) -> tuple[Control, ...]
 def run_all(
     label: str, plans: Sequence[Scenario], options: RunOptions, done: Sequence[Summary] = ()
 ) -> list[Summary]:
-    """Runs scenarios and shows how many have run; returns their summaries, those of `done` first."""
+    """Runs scenarios, shows how many have run; returns `done` and the summaries of the others."""
     compiled, found = options.engine == "compiled", list(done)
     batch = run_batch(plans, fmu=options.fmu, gains=options.gains, compiled=compiled)
     with counting_bar(label, len(done) + len(plans)) as report_count, closing(batch) as runs:
