@@ -63,6 +63,11 @@ def test_units_reach_into_commands_events_and_settings() -> None:
     assert (scenario.events[0].time, scenario.events[0].force) == (0.01, (1000.0, 0.0, 0.0))
 
 
+def test_soil_is_set_by_the_name_of_a_preset() -> None:
+    scenario = load_scenario("walk_flat", overrides=["soil=dry_sand"])
+    assert scenario.settings["soil"]["law"] == "bekker"
+
+
 def test_set_reaches_scenario_keys_and_hands_other_names_to_the_fmu() -> None:
     overrides = [
         "robot=phantomx_mk4",
