@@ -37,7 +37,6 @@ from hexapod_cosim.models.records import Robot
 
 UNKNOWNS = 6 + LEGS * JOINTS
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-ZERO = np.zeros((LEGS, JOINTS))  # rad, rad/s
 
 
 def kinetic_energy(robot: Robot, body: Array) -> float:
@@ -109,19 +108,13 @@ def joint_mobility(robot: Robot) -> Array:
 
 def _at_zero(robot: Robot) -> tuple[Array, Array]:
     """Returns the bodies' motion per speed (114, 24) and the mass matrix (24, 24), at angle 0."""
-    J = np.stack(
-        [_motion(robot, speed).ravel() for speed in np.eye(UNKNOWNS)], axis=-1
-    )  # (114, 24)
-    body = body_states(robot, np.zeros(3), UPRIGHT, np.zeros(3), np.zeros(3), ZERO, ZERO)
+    place, still = np.zeros(3), np.zeros((LEGS, JOINTS))
+
+    def moving(speed: Array) -> Array:
+        """Returns bodies (19, 13) at speeds of the torso (6,) and the joints (18,)."""
+        torso, joints = (speed[:3], speed[3:6]), speed[6:].reshape(LEGS, JOINTS)
+        return body_states(robot, place, UPRIGHT, *torso, still, joints)
+
+    J = np.stack([moving(speed)[:, 7:13].ravel() for speed in np.eye(UNKNOWNS)], axis=-1)
     plain = replace(robot, servo=replace(robot.servo, gear_ratio=0.0))
-    return J, np.asarray(J.T @ mass_matrix(plain, body) @ J)
-
-
-def _motion(robot: Robot, speed: Array) -> Array:
-    """Returns velocities and angular velocities (19, 6) of the bodies at angle 0.
-
-    speed (24,): the torso's (6,) and the joints' (18,).
-    """
-    return body_states(
-        robot, np.zeros(3), UPRIGHT, speed[:3], speed[3:6], ZERO, speed[6:].reshape(LEGS, JOINTS)
-    )[:, 7:13]
+    return J, np.asarray(J.T @ mass_matrix(plain, moving(np.zeros(UNKNOWNS))) @ J)

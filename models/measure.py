@@ -281,8 +281,7 @@ def _under_load(robot: Robot, h: float, force: Array, speed: Array) -> Array:
 
     The force is linear between nodes; load is a force above LOAD_SHARE of the weight.
     """
-    mass = robot.torso.mass + sum(link.mass for leg in robot.legs for link in leg.links)
-    above = force - LOAD_SHARE * mass * float(np.linalg.norm(robot.gravity))
+    above = force - LOAD_SHARE * robot.total_mass * float(np.linalg.norm(robot.gravity))
     total = np.zeros(LEGS)
     for (a, b), (v, w) in zip(pairwise(above), pairwise(speed), strict=True):
         crossing = np.abs(a) / np.maximum(np.abs(a) + np.abs(b), 1e-300)

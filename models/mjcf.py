@@ -229,15 +229,10 @@ def _foot(tibia: ET.Element, leg: Leg, robot: Robot, place: Vector3) -> None:
 
 def _tibia_spheres(tibia: ET.Element, leg: Leg, robot: Robot) -> None:
     """Adds the spheres of knee and shank."""
-    body = robot.body
-    for name, radius, share in (
-        ("knee", body.knee_radius, 0.0),
-        ("shank", body.shank_radius, body.shank_position),
-    ):
-        if radius > 0.0:
-            place = joined(share * value for value in leg.links[-1].tip)
-            sphere = {"name": f"{leg.name}_{name}", "type": "sphere", "size": repr(radius)}
-            add(tibia, "geom", _body_attributes(robot) | sphere | {"pos": place})
+    for name, radius, share in robot.body.tibia_spheres:
+        place = joined(share * value for value in leg.links[-1].tip)
+        sphere = {"name": f"{leg.name}_{name}", "type": "sphere", "size": repr(radius)}
+        add(tibia, "geom", _body_attributes(robot) | sphere | {"pos": place})
 
 
 def _hinge(body: ET.Element, name: str, link: Link, robot: Robot, mobility: float) -> None:

@@ -21,7 +21,6 @@ from hexapod_cosim.models.contact.forces import (
     Contacts,
     closed_contacts,
     contact_bristle_rate,
-    contacts_of,
 )
 from hexapod_cosim.models.contact.geometry import (
     FootContact,
@@ -86,20 +85,13 @@ class StageRate:
 
 
 def keep_slopes(
-    robot: Robot,
-    body: Array,
-    bristle: Array,
-    command: Command,
-    damping: Array | Contacts,
-    ahead: float,
+    robot: Robot, body: Array, bristle: Array, command: Command, contacts: Contacts, ahead: float
 ) -> Slopes:
     """Returns the derivatives of the forces at bodies (19, 13) and bristles (6, 3).
 
     The contacts' are taken at delta + ahead max(ddelta, 0), because a foot that has just touched
-    down has neither depth nor derivatives yet, and W would miss its contact. damping: (6,) of the
-    feet [s/m], nan for open ones, or the state of all contacts.
+    down has neither depth nor derivatives yet, and W would miss its contact.
     """
-    contacts = damping if isinstance(damping, Contacts) else contacts_of(robot, damping)
     angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
     references = (command.angle_ref, command.speed_ref, command.torque_ref)
     motor = servo_slopes(robot.servo, angle, speed, *references, power=command.power)
@@ -230,7 +222,7 @@ def solve_stage(
     body: Array,
     bristle: Array,
     command: Command,
-    damping: Array | Contacts,
+    contacts: Contacts,
     slopes: Slopes,
     z: float,
     change: tuple[Array, Array, Array],
@@ -240,12 +232,11 @@ def solve_stage(
     Args:
         robot, command: as in `accelerations`.
         body, bristle: y_i of the stage.
-        damping: as in `keep_slopes`.
+        contacts: the state of all contacts.
         slopes: those of the step's first stage.
         z: h gamma [s]; 0 for explicit methods.
         change: s_x (114,), s_v (114,) and s_b (6, 3), the sums of g_ij k_j over earlier stages.
     """
-    contacts = damping if isinstance(damping, Contacts) else contacts_of(robot, damping)
     s_x, s_v, s_b = change
     v, joints = body[:, 7:13].ravel(), constraints(robot, body)
     G = joints.G

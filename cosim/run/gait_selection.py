@@ -28,13 +28,14 @@ from hexapod_cosim.cosim.control.fmu_law import walk_of_fmu
 from hexapod_cosim.cosim.design.stance import (
     SPEED_SHARE,
     Motion,
+    StanceChange,
     find_stance,
     settled_motion,
     with_stance,
 )
 from hexapod_cosim.cosim.export.robot_package import SPEED
 from hexapod_cosim.cosim.results.facts import OF_FMU, OWN_CONTROLLER, GaitChoice
-from hexapod_cosim.cosim.run.designs import StanceChange, kept_stance
+from hexapod_cosim.cosim.run.designs import kept_stance
 from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.reach import reaches
 from hexapod_cosim.cosim.scenario.reading import scenario_robot
@@ -252,12 +253,7 @@ def _design(robot: Robot, gait: Gait) -> StanceChange:
     """Returns the stance of least heat of a robot file, designed once and kept in the user's
     cache.
     """
-    return kept_stance(robot, gait, _found)
-
-
-def _found(robot: Robot, gait: Gait) -> StanceChange:
-    design = find_stance(robot, gait=gait)
-    return StanceChange(design.outward, design.deeper)
+    return kept_stance(robot, gait, find_stance)
 
 
 def known_robot(scenario: Scenario) -> Robot:

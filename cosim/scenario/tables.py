@@ -129,7 +129,7 @@ def _set(table: dict[str, Any], name: str, value: Any) -> None:
         inner[key] = value
     elif dot or "[" in name:
         table.setdefault("parameters", {})[name] = value
-    elif name in SETTINGS and not isinstance(value, dict):
+    elif name in SETTINGS and not isinstance(value, dict) and name != "soil":  # has presets
         raise ScenarioError(
             "a section, which has keys",
             got=f"{name}={value}",

@@ -55,11 +55,8 @@ def body_spheres(robot: Robot) -> tuple[BodySphere, ...]:
         for z, y, x in product((-1.0, 1.0), repeat=3):
             corner = offset + np.array([x, y, z]) * body.torso_box
             spheres.append(BodySphere("torso", 0, corner, body.corner_radius))
-    for name, radius, share in (
-        ("knee", body.knee_radius, 0.0),
-        ("shank", body.shank_radius, body.shank_position),
-    ):
-        for leg in range(LEGS if radius > 0.0 else 0):
+    for name, radius, share in body.tibia_spheres:
+        for leg in range(LEGS):
             tibia = robot.legs[leg].links[-1]
             centre = share * np.array(tibia.tip) - np.array(tibia.com)
             label = f"{robot.legs[leg].name}.{name}"

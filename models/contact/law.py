@@ -54,6 +54,12 @@ class BodyContact:
     # of the shank's sphere: 0 at the tibia's joint, 1 at the foot's centre
     shank_position: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.5
 
+    @property
+    def tibia_spheres(self) -> list[tuple[str, float, float]]:
+        """Name, radius [m] and place of knee and shank, 0 at the joint to 1 at the foot."""
+        parts = [("knee", self.knee_radius, 0.0), ("shank", self.shank_radius, self.shank_position)]
+        return [part for part in parts if part[1] > 0.0]
+
 
 @dataclass(frozen=True)
 class ContactState:

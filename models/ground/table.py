@@ -15,13 +15,7 @@ from typing import Any
 from hexapod_cosim.models.errors import RobotError, refuse_path, unknown_name
 from hexapod_cosim.models.ground.height_map import MAPS
 from hexapod_cosim.models.ground.parameters import Entries, Entry, read_values, with_defaults
-from hexapod_cosim.models.ground.patches import (
-    PATCH,
-    check_soil,
-    read_patches,
-    with_patches,
-    with_soil,
-)
+from hexapod_cosim.models.ground.patches import PATCH, read_patches, with_patches, with_soil
 from hexapod_cosim.models.ground.rough import SMOOTH
 from hexapod_cosim.models.ground.steps import BLOCKS
 from hexapod_cosim.models.ground.surface import PLANES, Surface, Terrain
@@ -33,6 +27,7 @@ from hexapod_cosim.models.schema import (
     refuse_unknown_keys,
     specs,
 )
+from hexapod_cosim.models.soil.presets import soil_preset
 
 MOST_NODES = 1 << 24  # of a generated surface
 KEPT = 32  # surfaces in the cache
@@ -90,7 +85,7 @@ def _made(
     _check_size(values, where)
     surface = entry.make(SimpleNamespace(**values))
     if "soil" in values:
-        check_soil(values["soil"], f"{where}.soil")
+        soil_preset(values["soil"], where=f"{where}.soil")  # refuses an unknown one
         surface = with_soil(surface, values["soil"])
     return with_patches(surface, [dict(patch) for patch in patches], where=f"{where}.patch")
 

@@ -91,10 +91,9 @@ def _joint(root: ET.Element, name: str, kind: str, parent: str, child: str) -> E
 
 def _tibia_spheres(tibia: ET.Element, link: Link, body: BodyContact) -> None:
     """Adds the spheres of knee and shank as collision shapes."""
-    for radius, share in ((body.knee_radius, 0.0), (body.shank_radius, body.shank_position)):
-        if radius > 0.0:
-            place = (share * value for value in link.tip)
-            add(_shape(tibia, "collision", place, None), "sphere", radius=radius)
+    for _, radius, share in body.tibia_spheres:
+        place = (share * value for value in link.tip)
+        add(_shape(tibia, "collision", place, None), "sphere", radius=radius)
 
 
 def _limb(root: ET.Element, name: str, link: Link, radius: float) -> ET.Element:
