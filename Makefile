@@ -225,7 +225,7 @@ check: setup typing lint-c
 	$(BIN)/python tools/generate.py --check
 	$(BIN)/python tools/rooms.py --check
 
-bench: setup
+bench: setup typing
 	$(BIN)/python -m benchmarks.run
 
 bench-quick: setup

@@ -15,9 +15,9 @@ time-stepping plant's (discrete at 5e-5 s). Their friction differs.
 
 METHOD: one of Drake's integration schemes, STEP its accuracy; or `discrete`, the time-stepping
 plant (lagged), STEP its period in s. Evaluations are those of the right-hand side, or steps where
-Drake does not count them. Microseconds per evaluation are those of CalcTimeDerivatives at a new
-state, less the time to set it; they are unknown for the discrete plant. CENIC does not call this
-function: it solves one convex problem per step.
+Drake does not count them (discrete and CENIC, which solves one convex problem per step).
+Microseconds per evaluation are those of CalcTimeDerivatives, less the time to set a new state, and
+null for the discrete plant.
 """
 
 from __future__ import annotations
@@ -57,6 +57,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "support"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "build" / "typing"))  # `make typing`
 from mirror import JOINTS, LEGS, HxDefinition, HxInput
 
 Array = NDArray[np.float64]
@@ -67,7 +68,7 @@ EVALUATIONS = 2000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Walk:
+class Recording:
     """Content of a walk file: the robot, and n commands, each constant over h [s]."""
 
     robot: Any
@@ -75,18 +76,12 @@ class Walk:
     inputs: list[Any]
 
 
-def read_walk(path: str) -> Walk:
+def read_walk(path: str) -> Recording:
     """Reads a walk file."""
-    data = Path(path).read_bytes()
-    robot = HxDefinition.from_buffer_copy(data)
-    start = ct.sizeof(HxDefinition)
+    data, start = Path(path).read_bytes(), ct.sizeof(HxDefinition)
     n, h = struct.unpack_from("=qd", data, start)
-    first = start + struct.calcsize("=qd")
-    return Walk(
-        robot=robot,
-        h=h,
-        inputs=[HxInput.from_buffer_copy(data, first + k * ct.sizeof(HxInput)) for k in range(n)],
-    )
+    inputs = (HxInput * n).from_buffer_copy(data, start + struct.calcsize("=qd"))
+    return Recording(robot=HxDefinition.from_buffer_copy(data), h=h, inputs=list(inputs))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,12 +114,9 @@ def build(robot: Any, *, time_step: float) -> Model:
 
 def add_link(plant: MultibodyPlant, name: str, link: Any) -> RigidBody:
     """Adds a body with mass [kg], centre of mass [m] and inertia about it [kg m2]."""
-    return plant.AddRigidBody(
-        name,
-        SpatialInertia.MakeFromCentralInertia(
-            link.mass, np.array(link.com), RotationalInertia(*link.inertia)
-        ),
-    )
+    about_centre = RotationalInertia(*link.inertia)
+    inertia = SpatialInertia.MakeFromCentralInertia(link.mass, np.array(link.com), about_centre)
+    return plant.AddRigidBody(name, inertia)
 
 
 def add_leg(plant: MultibodyPlant, robot: Any, leg: int, torso: RigidBody) -> None:
@@ -157,36 +149,26 @@ def foot_material(robot: Any) -> ProximityProperties:
     masses = robot.torso.mass + sum(link.mass for leg in robot.leg for link in leg.link)
     load = masses * float(np.linalg.norm(robot.gravity)) / LEGS
     depth = (load / robot.contact.stiffness) ** (2.0 / 3.0)
-    return material(
-        load / depth,
-        exact_restitution_chi(robot.contact.restitution) / IMPACT_SPEED,
-        robot.friction.mu,
-    )
+    chi = exact_restitution_chi(robot.contact.restitution)
+    return material(load / depth, chi / IMPACT_SPEED, robot.friction.mu)
 
 
 def material(stiffness: float, dissipation: float, mu: float) -> ProximityProperties:
     """Returns a material with stiffness [N/m], Hunt-Crossley dissipation [s/m] and friction."""
-    properties = ProximityProperties()
+    properties, friction = ProximityProperties(), CoulombFriction(mu, mu)
     AddContactMaterial(
-        dissipation=dissipation,
-        point_stiffness=stiffness,
-        friction=CoulombFriction(mu, mu),
-        properties=properties,
+        dissipation=dissipation, point_stiffness=stiffness, friction=friction, properties=properties
     )
     return properties
 
 
 def exact_restitution_chi(e: float) -> float:
-    """Returns the root of chi (1 + e) = ln[(1 + chi)/(1 - chi e)] other than 0.
-
-    It does not depend on the exponent of the elastic force.
-    """
+    """Returns the root of chi (1 + e) = ln[(1 + chi)/(1 - chi e)] other than 0."""
     low, high = 0.0, 1.0 / e
     for _ in range(100 if e < 1.0 else 0):
         chi = 0.5 * (low + high)
-        low, high = (
-            (chi, high) if math.log1p(chi) - math.log1p(-chi * e) < chi * (1.0 + e) else (low, chi)
-        )
+        below = math.log1p(chi) - math.log1p(-chi * e) < chi * (1.0 + e)
+        low, high = (chi, high) if below else (low, chi)
     return low
 
 
@@ -194,13 +176,8 @@ def add_ground(plant: MultibodyPlant, robot: Any) -> None:
     """Adds a rigid half space through (0, 0, height) that rises along the heading."""
     terrain = robot.terrain
     incline = terrain.incline if terrain.kind == 2 else 0.0
-    normal = np.array(
-        [
-            -math.sin(incline) * math.cos(terrain.heading),
-            -math.sin(incline) * math.sin(terrain.heading),
-            math.cos(incline),
-        ]
-    )
+    slope, heading = -math.sin(incline), terrain.heading
+    normal = np.array([slope * math.cos(heading), slope * math.sin(heading), math.cos(incline)])
     pose = HalfSpace.MakePose(normal, np.array([0.0, 0.0, terrain.height]))
     plant.RegisterCollisionGeometry(
         plant.world_body(), pose, HalfSpace(), "ground", material(RIGID, 0.0, robot.friction.mu)
@@ -247,7 +224,7 @@ def simulator_of(model: Model, method: str, step: float, h: float) -> Simulator:
     return simulator
 
 
-def walk_once(model: Model, walk: Walk, method: str, step: float) -> tuple[float, int, Array]:
+def walk_once(model: Model, walk: Recording, method: str, step: float) -> tuple[float, int, Array]:
     """Returns the loop's time [s], evaluations (or steps), and the path (n + 1, 3) [m]."""
     simulator = simulator_of(model, method, step, walk.h)
     context = simulator.get_mutable_context()
@@ -261,13 +238,13 @@ def walk_once(model: Model, walk: Walk, method: str, step: float) -> tuple[float
         simulator.AdvanceTo((k + 1) * walk.h)
         path.append(torso_position(model, walk.robot, context))
     seconds = time.perf_counter() - begin
-    evaluations = (
-        0 if method == "discrete" else simulator.get_integrator().get_num_derivative_evaluations()
-    )
+    evaluations = 0
+    if method != "discrete":
+        evaluations = simulator.get_integrator().get_num_derivative_evaluations()
     return seconds, evaluations or simulator.get_num_steps_taken(), np.array(path)
 
 
-def microseconds_per_evaluation(model: Model, walk: Walk) -> float:
+def microseconds_per_evaluation(model: Model, walk: Recording) -> float:
     """Returns the time of CalcTimeDerivatives [us], evaluated at a new state each time."""
     context = model.diagram.CreateDefaultContext()
     put_at_start(model, walk.robot, context)
@@ -307,11 +284,8 @@ def main(walk_path: str, method: str, step: str, repeats: str, path_out: str) ->
         seconds.append(taken)
     path.tofile(path_out)
     each = None if discrete else microseconds_per_evaluation(model, walk)
-    print(
-        json.dumps(
-            {"seconds": seconds, "evaluations": evaluations, "microseconds_per_evaluation": each}
-        )
-    )
+    found = {"seconds": seconds, "evaluations": evaluations, "microseconds_per_evaluation": each}
+    print(json.dumps(found))
 
 
 if __name__ == "__main__":

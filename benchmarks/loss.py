@@ -12,8 +12,9 @@ from itertools import combinations, product
 
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch
+from hexapod_cosim.cosim.scenario.events import WHOLE_LEG
 from hexapod_cosim.cosim.scenario.reading import load_scenario
-from hexapod_cosim.cosim.scenario.records import WHOLE_LEG, Scenario
+from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 SEEDS = 10  # by default

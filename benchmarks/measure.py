@@ -57,6 +57,7 @@ class Bench:
 
     tools: Tools
     walks: Mapping[str, Path]  # files by name
+    errors: dict[str, str] = field(default_factory=dict)  # the last of each engine that failed
     _references: dict[str, Array] = field(default_factory=dict)
 
     def run(self, series: Series, setting: float, walk: str) -> Run:
@@ -76,7 +77,8 @@ class Bench:
                     series.engine, series.method, setting, walk, repeats=repeats
                 )
             error = distance(path, self.reference(series, walk))
-        except DriverError:
+        except DriverError as failure:
+            self.errors[series.engine] = str(failure).splitlines()[-1]
             return Run(
                 error=math.inf,
                 seconds=math.inf,

@@ -13,13 +13,14 @@ import math
 import os
 import platform
 import subprocess
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.progress import track
+from rich.table import Table
 
 from benchmarks import BUILD, RESULTS, machine
 from benchmarks.figure import draw
@@ -37,9 +38,9 @@ from benchmarks.parts import (
 )
 from benchmarks.series import OURS, PLANT_LAW, Series, command, ours, peers
 from benchmarks.studies import measured_studies
-from benchmarks.table import Parts, Row, chosen_setting, goals, rows, shown
+from benchmarks.table import Parts, Row, chosen_setting, goals, rows
 from benchmarks.toolchain import REQUIREMENTS, Tools, prepare
-from benchmarks.walks import STIFF_RUBBER, STIFF_SLOPE, Walk, family, stiff, write
+from benchmarks.walks import STIFF_RUBBER, STIFF_SLOPE, Case, family, stiff, write
 
 QUICK_WALKS = 5  # every n-th walk; odd, so that both robots are included
 QUICK_SETTINGS = 2  # every n-th setting
@@ -48,6 +49,7 @@ STEEP = {
     f"rubber of {STIFF_RUBBER:g} N/m^1.5": {"stiffness": STIFF_RUBBER},
 }
 DERIVATIVE_WALKS = 4
+MET = {True: "[green]yes[/green]", False: "[red]no[/red]", None: ""}  # goals
 
 console = Console(width=180)
 
@@ -67,8 +69,6 @@ def main() -> None:
     tools = prepare(quick=quick)
     folder = BUILD / "quick" if quick else RESULTS / machine()
     folder.mkdir(parents=True, exist_ok=True)
-    facts = json.dumps(described(tools), indent=2)
-    (folder / "machine.json").write_text(f"{facts}\n", encoding="utf-8")
     series = [
         *_chosen(ours(), quick),
         *_chosen([one for one in peers() if command(one.engine, tools)], quick),
@@ -77,6 +77,10 @@ def main() -> None:
     files = {walk.name: write(walk) for walk in walks}
     bench = Bench(tools, files | _steep_files(walks))
     runs = measured(bench, series, [walk.name for walk in walks])
+    worked = {run.engine for run in runs if math.isfinite(run.seconds)}
+    tools.missing.update({one: bench.errors[one] for one in bench.errors if one not in worked})
+    facts = json.dumps(described(tools), indent=2)
+    (folder / "machine.json").write_text(f"{facts}\n", encoding="utf-8")
     _write_walks(folder, runs, series, tools)
     parts, scaling = measured_parts(bench, series, runs, walks, quick=quick)
     table = rows(runs, series, parts)
@@ -95,7 +99,7 @@ def _chosen(series: Sequence[Series], quick: bool) -> list[Series]:
     return [replace(one, settings=one.settings[::QUICK_SETTINGS]) for one in series if one.quick]
 
 
-def _steep_files(walks: Iterable[Walk]) -> dict[str, Path]:
+def _steep_files(walks: Iterable[Case]) -> dict[str, Path]:
     changed = [stiff(walk, **change) for walk in walks for change in STEEP.values()]
     return {walk.name: write(walk) for walk in changed}
 
@@ -119,7 +123,7 @@ def measured_parts(
     bench: Bench,
     series: Sequence[Series],
     runs: Sequence[Run],
-    walks: Sequence[Walk],
+    walks: Sequence[Case],
     *,
     quick: bool,
 ) -> tuple[Parts, list[dict[str, Any]]]:
@@ -214,6 +218,37 @@ def _print_results(
     for peer, reason in tools.missing.items():
         console.print(f"{peer} is missing: {reason}", markup=False)
     console.print(f"written to {folder}")
+
+
+def shown(found: Sequence[Row], *, title: str) -> Table:
+    """Formats the table for a terminal."""
+    table = Table(title=title)
+    columns: tuple[tuple[str, Callable[[Row], str], Any], ...] = (
+        ("figure", lambda row: f"{row.figure} [{row.unit}]".replace("[", "\\["), "left"),
+        ("ours", lambda row: _number(row.ours), "right"),
+        ("peer", lambda row: row.peer, "left"),
+        ("theirs", lambda row: _number(row.theirs), "right"),
+        ("ratio", lambda row: _number(row.ratio), "right"),
+        ("goal", _goal, "right"),
+        ("met", lambda row: MET[row.met], "left"),
+    )
+    for name, _, justify in columns:
+        table.add_column(name, justify=justify, no_wrap=name != "figure")
+    for row in found:
+        table.add_row(*(text(row) for _, text, _ in columns))
+    return table
+
+
+def _goal(row: Row) -> str:
+    if math.isnan(row.goal):
+        return ""
+    judged = "ratio" if row.judged == "ratio" else ""
+    relation = "<=" if row.better == "less" else ">="
+    return f"{judged} {relation} {_number(row.goal)}".strip()
+
+
+def _number(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
 
 
 if __name__ == "__main__":

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
-
-from rich.table import Table
 
 from benchmarks.judge import Choice, best, per_evaluation, spreads
 from benchmarks.measure import Run
@@ -293,37 +291,3 @@ def chosen_setting(runs: Sequence[Run], series: Sequence[Series]) -> Choice | No
     """Returns our method and setting in the table at the coarser error."""
     mine = [one for one in series if one.engine == OURS]
     return best(runs, mine, FINE) or best(runs, mine, FINE, every_walk=False)
-
-
-def shown(found: Sequence[Row], *, title: str) -> Table:
-    """Formats the table for a terminal."""
-    table = Table(title=title)
-    columns: tuple[tuple[str, Callable[[Row], str], Any], ...] = (
-        ("figure", lambda row: f"{row.figure} [{row.unit}]".replace("[", "\\["), "left"),
-        ("ours", lambda row: _number(row.ours), "right"),
-        ("peer", lambda row: row.peer, "left"),
-        ("theirs", lambda row: _number(row.theirs), "right"),
-        ("ratio", lambda row: _number(row.ratio), "right"),
-        ("goal", _goal, "right"),
-        ("met", lambda row: MET[row.met], "left"),
-    )
-    for name, _, justify in columns:
-        table.add_column(name, justify=justify, no_wrap=name != "figure")
-    for row in found:
-        table.add_row(*(text(row) for _, text, _ in columns))
-    return table
-
-
-MET = {True: "[green]yes[/green]", False: "[red]no[/red]", None: ""}
-
-
-def _goal(row: Row) -> str:
-    if math.isnan(row.goal):
-        return ""
-    judged = "ratio" if row.judged == "ratio" else ""
-    relation = "<=" if row.better == "less" else ">="
-    return f"{judged} {relation} {_number(row.goal)}".strip()
-
-
-def _number(value: float) -> str:
-    return "" if math.isnan(value) else f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"

@@ -43,8 +43,8 @@ STIFF_SLOPE, STIFF_RUBBER = 1000.0, 1e7  # s/m, N/m^1.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Walk:
-    """One member of the family."""
+class Case:
+    """One walk of the family: a robot on its ground, a gait and a command."""
 
     name: str
     robot: Robot
@@ -57,14 +57,14 @@ class Walk:
         return round(DURATION / STEP)
 
 
-def family() -> list[Walk]:
+def family() -> list[Case]:
     """Returns the walks of the family, which are always the same."""
     generator = np.random.default_rng(SEED)
     places = [(robot, gait, k) for k in range(VARIANTS) for gait in PATTERNS for robot in ROBOTS]
     return [_drawn(generator, *place) for place in places]
 
 
-def stiff(walk: Walk, *, slope: float | None = None, stiffness: float | None = None) -> Walk:
+def stiff(walk: Case, *, slope: float | None = None, stiffness: float | None = None) -> Case:
     """Returns the walk with a steeper friction law [s/m] or a stiffer foot [N/m^1.5].
 
     Its name contains the change.
@@ -83,7 +83,7 @@ def stiff(walk: Walk, *, slope: float | None = None, stiffness: float | None = N
     return replace(walk, name=name, robot=robot)
 
 
-def _drawn(generator: np.random.Generator, robot_name: str, gait_name: str, k: int) -> Walk:
+def _drawn(generator: np.random.Generator, robot_name: str, gait_name: str, k: int) -> Case:
     """Draws one walk; draws again if the legs cannot reach it."""
     robot = load_robot(robot_name)
     gait = make_gait(robot, gait_name)
@@ -98,7 +98,7 @@ def _drawn(generator: np.random.Generator, robot_name: str, gait_name: str, k: i
     )
     friction = replace(robot.friction, mu=generator.uniform(*MU))
     name = f"{robot_name}-{gait_name}-{k}"
-    return Walk(
+    return Case(
         name=name,
         robot=replace(robot, contact=contact, friction=friction),
         gait=gait,
@@ -114,7 +114,7 @@ def _reachable(command: BodyCommand, robot: Robot, gait: Gait) -> bool:
     return True
 
 
-def commands(walk: Walk, *, steps: int | None = None) -> Iterator[Command]:
+def commands(walk: Case, *, steps: int | None = None) -> Iterator[Command]:
     """Yields the commands of the servos at k h, without feedback; each has arrays of its own.
 
     `steps` replaces the number of macro-steps.
@@ -129,13 +129,13 @@ def commands(walk: Walk, *, steps: int | None = None) -> Iterator[Command]:
         )
 
 
-def start(walk: Walk) -> Any:
+def start(walk: Case) -> Any:
     """Returns the hxDefinition of the robot at rest on the ground, in its stance."""
     position, quaternion, angle = settled(walk.robot)
     return definition(walk.robot, position=position, quaternion=quaternion, angle=angle)
 
 
-def file_bytes(walk: Walk) -> bytes:
+def file_bytes(walk: Case) -> bytes:
     """Returns the content of the walk's file."""
     parts = [
         bytes(start(walk)),
@@ -145,7 +145,7 @@ def file_bytes(walk: Walk) -> bytes:
     return b"".join(parts)
 
 
-def write(walk: Walk, folder: Path = BUILD / "walks") -> Path:
+def write(walk: Case, folder: Path = BUILD / "walks") -> Path:
     """Writes the walk's file and returns its path."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{walk.name}.walk"
@@ -153,7 +153,7 @@ def write(walk: Walk, folder: Path = BUILD / "walks") -> Path:
     return path
 
 
-def describe(walk: Walk) -> str:
+def describe(walk: Case) -> str:
     """Returns one line about a walk."""
     robot, command = walk.robot, walk.command
     return (

@@ -12,15 +12,8 @@ from typing import Any
 from hexapod_cosim.controller.gains import SECTIONS, Gains, GainsError
 from hexapod_cosim.models import RobotError
 from hexapod_cosim.models.errors import refuse_path
-from hexapod_cosim.models.files import read_text
-from hexapod_cosim.models.schema import (
-    decoding_toml,
-    parse_toml,
-    read_given,
-    read_record,
-    require,
-    specs,
-)
+from hexapod_cosim.models.files import decoding_toml, parse_toml, read_text
+from hexapod_cosim.models.schema import read_given, read_record, require, specs
 
 FORMAT = 5
 

@@ -44,16 +44,22 @@ class WalkPlan(Stateful):
         cut: the present step is the last of its section.
         before, now, after: the step before the present one, this one and the next one. None: there
             is none in the section.
-        laws: compliant control, on which the plan depends; None: none.
+        compliant: compliant control, on which the plan depends; None: none.
     """
 
     STATE = ("pace", "ramp", "paths", "at", "last", "cut", "before", "now", "after", "absence")
 
     def __init__(
-        self, gait: Gait, parts: Parts, *, legs: LegSolver, period: float, laws: Compliant | None
+        self,
+        gait: Gait,
+        parts: Parts,
+        *,
+        legs: LegSolver,
+        period: float,
+        compliant: Compliant | None,
     ) -> None:
         """Plans to stand. Constants depend on the gait; period: of the controller [s]."""
-        self.legs, self.period, self.laws = legs, period, laws
+        self.legs, self.period, self.compliant = legs, period, compliant
         self.ramp = CommandRamp(gait.period, period=period)
         home = legs.forward(legs.stance)
         inward = -gait.narrowing * cis(legs.hip_yaw + legs.stance[:, 0])
@@ -61,11 +67,11 @@ class WalkPlan(Stateful):
         turned = legs.rolling(narrow.angle)
         self.paths = FootPaths(gait, home, period=period, inward=inward, turned=turned)
         self.pace = Pace(gait, legs, self.paths.home_height)
-        if laws is not None:
-            self.paths.clock.handover = laws.support.handover
-        handover = 0.0 if laws is None else laws.support.handover * gait.period
+        if compliant is not None:
+            self.paths.clock.handover = compliant.support.handover
+        handover = 0.0 if compliant is None else compliant.support.handover * gait.period
         self.absence = Absence(legs, self.paths.home, handover=handover, period=period)
-        self.planner = StepPlanner(parts, legs=legs, laws=laws)
+        self.planner = StepPlanner(parts, legs=legs, compliant=compliant)
         self.now: PlannedStep
         self.reset()
 
@@ -110,8 +116,8 @@ class WalkPlan(Stateful):
             value = value + np.array([drift.real, drift.imag, 0.0, 0.0, 0.0, 0.0])
         vx, vy, yaw_rate = value[:3].tolist()
         twist = Twist(complex(vx, vy), yaw_rate)
-        if self.laws is not None:
-            added = self.laws.addition(number)
+        if self.compliant is not None:
+            added = self.compliant.addition(number)
             twist = Twist(twist.velocity + added.velocity, twist.yaw_rate + added.yaw_rate)
         return value, Posture.of(value[3:], rate[3:]), twist
 
@@ -123,15 +129,15 @@ class WalkPlan(Stateful):
 
     # --------------------------------------------------------------------------------- sections
 
-    def _follow_sensors(self, laws: Compliant) -> None:
+    def _follow_sensors(self, compliant: Compliant) -> None:
         """Notes which feet have met the ground on their way down (C51), and narrows the stance.
 
         The steps of a commanded motion aim at the stance that the weight asks for (C53).
         """
         paths = self.paths
-        paths.met = paths.clock.swinging & (self.now.feet.rise < 0.0) & laws.laws.meets()
+        paths.met = paths.clock.swinging & (self.now.feet.rise < 0.0) & compliant.laws.meets()
         if self.ramp.moves():
-            paths.narrowing = laws.adaptation.narrowing
+            paths.narrowing = compliant.adaptation.narrowing
 
     def _waits(self) -> bool:
         """Returns whether the gait clock waits for feet at the ends of their swings (C50).
@@ -139,9 +145,9 @@ class WalkPlan(Stateful):
         It does not without a leg, because a foot may then have no load to carry.
         """
         clock = self.paths.clock
-        if self.laws is None or clock.absent.any():
+        if self.compliant is None or clock.absent.any():
             return False
-        return self.laws.laws.waits(clock.landing(self.at), waiting=clock.waiting)
+        return self.compliant.laws.waits(clock.landing(self.at), waiting=clock.waiting)
 
     def _plan_afresh(self, *, waiting: bool) -> None:
         """Begins a new section at the present step, and plans the step after it.
@@ -149,8 +155,8 @@ class WalkPlan(Stateful):
         waiting: the gait clock stands still in it.
         """
         moves, settled = self.ramp.moves(), self.ramp.settled()
-        if self.laws is not None:
-            self.laws.steer(self.at, moves=moves, afresh=self.cut)
+        if self.compliant is not None:
+            self.compliant.steer(self.at, moves=moves, afresh=self.cut)
         value, posture, twist = self._look_ahead(0, 0)
         going = moves or not settled
         if waiting:
@@ -168,8 +174,8 @@ class WalkPlan(Stateful):
         command_changed: the plan no longer applies, and a new section begins.
         """
         due, clock = command_changed or self.after is None, self.paths.clock
-        if self.laws is not None:
-            self._follow_sensors(self.laws)
+        if self.compliant is not None:
+            self._follow_sensors(self.compliant)
         if due or clock.waiting:
             waiting = self._waits()
             if due or not waiting:
@@ -235,7 +241,7 @@ class WalkPlan(Stateful):
         """Goes on in the phase of the plan under another control, in the same gait."""
         self.restore(before.save())
         self.paths.met = NO_LEG
-        if self.laws is None:
+        if self.compliant is None:
             self.paths.narrowing = 0.0
         self.after, self.cut = None, True
 
@@ -256,13 +262,13 @@ class WalkPlan(Stateful):
         They are those of the paths with the shift due to rolling, without the lowering.
         """
         now = self.now
-        plane, height = now.posture.see_place(now.plane + now.shift, now.feet.height)
+        plane, height = now.posture.to_torso(now.plane + now.shift, now.feet.height)
         return rows_of(plane.real, plane.imag, height)
 
     def feet(self) -> Feet:
         """Returns the feet of the present step with rolling and lowering, torso frame."""
         now = self.now
-        return now.posture.see(
+        return now.posture.feet_to_torso(
             Feet(
                 plane=now.plane + now.shift,
                 height=now.height,
@@ -297,10 +303,10 @@ class WalkPlan(Stateful):
 
         speed: (6, 3) of the joints [rad/s].
         """
-        laws, now, clock = self.laws, self.now, self.paths.clock
-        assert laws is not None
-        demand = laws.dynamics.demand(self.motion(), speed, now.posture, self.planner.laden())
-        load = laws.plan(
+        compliant, now, clock = self.compliant, self.now, self.paths.clock
+        assert compliant is not None
+        demand = compliant.dynamics.demand(self.motion(), speed, now.posture, self.planner.laden())
+        load = compliant.plan(
             demand,
             now.activation,
             feet=now.plane + now.shift,

@@ -2,7 +2,13 @@
 motion.
 """
 
-from hexapod_cosim.models.contact.law import CONTACT_LAWS, Contact
+from hexapod_cosim.models.contact.law import (
+    BODY_CONTACTS,
+    CONTACT_LAWS,
+    SELF_CONTACTS,
+    BodyContact,
+    Contact,
+)
 from hexapod_cosim.models.errors import (
     FmuError,
     HexapodError,
@@ -13,30 +19,21 @@ from hexapod_cosim.models.errors import (
     unknown_name,
 )
 from hexapod_cosim.models.friction import FRICTION_LAWS, Friction
+from hexapod_cosim.models.ground.surface import TERRAINS, Terrain
 from hexapod_cosim.models.kinematics import foot_position, foot_positions
+from hexapod_cosim.models.method import METHODS, PROJECTIONS, Baumgarte, Solver
 from hexapod_cosim.models.records import (
-    BODY_CONTACTS,
     GAITS,
     JOINT_NAMES,
     LEG_NAMES,
-    METHODS,
-    PROJECTIONS,
-    SELF_CONTACTS,
     SERVO_DRIVES,
     SERVO_MODES,
-    SOIL_LAWS,
-    TERRAINS,
-    Baumgarte,
-    BodyContact,
     Foot,
     Gait,
     Leg,
     Link,
     Robot,
     Servo,
-    Soil,
-    Solver,
-    Terrain,
     Torso,
 )
 from hexapod_cosim.models.robot import (
@@ -46,6 +43,7 @@ from hexapod_cosim.models.robot import (
     load_robot,
     robot_from_table,
 )
+from hexapod_cosim.models.soil.presets import SOIL_LAWS, Soil
 from hexapod_cosim.models.validation import check_robot
 
 __all__ = [

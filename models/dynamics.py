@@ -3,8 +3,8 @@
 [ M  D^T ] [ dv     ]   [ g                                    ]
 [ D  0   ] [ lambda ] = [ gamma - 2 alpha dPhi - beta^2 Phi    ]     (eq. 1)
 
-The C plant solves the same system in O(n). Velocities are stacked body by body, v then w, world
-axes: 19 x 6 = 114. Each joint has 5 multipliers: 18 x 5 = 90.
+The C plant solves the same system in O(n). D, gamma, Phi and dPhi (eq. 2-4) are in constraints.py.
+Velocities are stacked body by body, v then w, world axes: 19 x 6 = 114.
 """
 
 from __future__ import annotations
@@ -15,31 +15,22 @@ import numpy as np
 
 from hexapod_cosim.models.actuator import gear_friction, overrun, servo_torque, stop_torque
 from hexapod_cosim.models.arrays import Array
-from hexapod_cosim.models.contact.forces import (
-    Contacts,
-    contact_wrenches,
-    contacts_of,
-    standing_pairs,
-)
-from hexapod_cosim.models.contact.spheres import standing_body_damping
+from hexapod_cosim.models.constraints import MULTIPLIERS, Constraints, constraints
+from hexapod_cosim.models.contact.bodies import standing_body_damping, standing_pairs
+from hexapod_cosim.models.contact.forces import Contacts, contact_wrenches, contacts_of
 from hexapod_cosim.models.kinematics import (
     BODIES,
     JOINTS,
     LEGS,
-    JointModel,
     cross,
     inertia_matrix,
     joint_angles,
     joint_models,
     joint_speeds,
     rotation_matrix,
-    skew,
-    split,
 )
 from hexapod_cosim.models.records import Robot, Servo
 from hexapod_cosim.models.servos.motor import FULL, Power, friction_torque, has_measured_friction
-
-MULTIPLIERS = 5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,88 +50,6 @@ class Command:
     acceleration_ref: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))
     power: Power = FULL  # of the motors; shares of limits (6, 3)
     age: float = 0.0  # s  time since the command; kinematic drives extrapolate (eq. 13)
-
-
-@dataclass(frozen=True)
-class JointKinematics:
-    """Constraint of a joint: rows 1-3 fix the point, rows 4-5 the axis."""
-
-    phi: Array  # (5,)  Phi
-    dphi: Array  # (5,)  its rate
-    D_i: Array  # (5, 6)  Jacobian on the parent's (v, w)
-    D_j: Array  # (5, 6)  on the child's
-    gamma: Array  # (5,)  -dD/dt (v, w)
-    s: Array  # (3,)  axis, world
-
-
-def joint_kinematics(joint: JointModel, parent: Array, child: Array) -> JointKinematics:
-    """Returns eq. 2-4 of the joint between two bodies (13,), which may have drifted.
-
-    The first row of gamma contains the time derivatives that the paper's print lacks.
-    """
-    (r_i, p_i, v_i, w_i), (r_j, p_j, v_j, w_j) = split(parent), split(child)
-    R_i, R_j = rotation_matrix(p_i), rotation_matrix(p_j)
-    sP_i, sP_j, s = R_i @ joint.point_i, R_j @ joint.point_j, R_i @ joint.s_i
-    a, b = R_j @ joint.a_j, R_j @ joint.b_j
-
-    # Phi = (r_j + s_j^P - r_i - s_i^P,  a.s,  b.s)
-    phi = np.concatenate([r_j + sP_j - r_i - sP_i, [a @ s, b @ s]])
-
-    # D = [-1, skew(s_i^P), 1, -skew(s_j^P);  0, -a^T skew(s), 0, -s^T skew(a);  the same with b]
-    one, none = np.eye(3), np.zeros(3)
-    D_i = np.vstack(
-        [
-            np.hstack([-one, skew(sP_i)]),
-            np.hstack([none, -a @ skew(s)]),
-            np.hstack([none, -b @ skew(s)]),
-        ]
-    )
-    D_j = np.vstack(
-        [
-            np.hstack([one, -skew(sP_j)]),
-            np.hstack([none, -s @ skew(a)]),
-            np.hstack([none, -s @ skew(b)]),
-        ]
-    )
-    dphi = D_i @ np.concatenate([v_i, w_i]) + D_j @ np.concatenate([v_j, w_j])
-
-    # gamma = (-skew(ds_i^P) w_i + skew(ds_j^P) w_j,
-    #          -s^T skew(w_j) da - a^T skew(w_i) ds - 2 da.ds,  the same with b)
-    dsP_i, dsP_j, ds = cross(w_i, sP_i), cross(w_j, sP_j), cross(w_i, s)
-    rows = [
-        -s @ skew(w_j) @ dn - n @ skew(w_i) @ ds - 2.0 * dn @ ds
-        for n, dn in ((a, cross(w_j, a)), (b, cross(w_j, b)))
-    ]
-    gamma = np.concatenate([-skew(dsP_i) @ w_i + skew(dsP_j) @ w_j, rows])
-    return JointKinematics(phi, dphi, D_i, D_j, gamma, s)
-
-
-@dataclass(frozen=True)
-class Constraints:
-    """Constraints of all joints, stacked."""
-
-    phi: Array  # (90,)
-    dphi: Array  # (90,)
-    D: Array  # (90, 114)
-    gamma: Array  # (90,)
-    G: Array  # (18, 114)  joint speeds: qd = G v
-
-
-def constraints(robot: Robot, body: Array) -> Constraints:
-    """Returns the constraint equations of the joints between bodies (19, 13)."""
-    models = joint_models(robot)
-    joints = [joint_kinematics(model, body[model.parent], body[model.child]) for model in models]
-    D, G = np.zeros((MULTIPLIERS * len(models), 6 * BODIES)), np.zeros((len(models), 6 * BODIES))
-    for k, (model, joint) in enumerate(zip(models, joints, strict=True)):
-        rows = slice(MULTIPLIERS * k, MULTIPLIERS * (k + 1))
-        i, j = 6 * model.parent, 6 * model.child
-        D[rows, i : i + 6], D[rows, j : j + 6] = joint.D_i, joint.D_j
-        G[k, i + 3 : i + 6], G[k, j + 3 : j + 6] = -joint.s, joint.s
-    stack = [
-        np.concatenate([getattr(joint, name) for joint in joints])
-        for name in ("phi", "dphi", "gamma")
-    ]
-    return Constraints(phi=stack[0], dphi=stack[1], D=D, gamma=stack[2], G=G)
 
 
 def masses(robot: Robot) -> Array:
@@ -184,11 +93,6 @@ def carried_turns(robot: Robot, G: Array) -> Array:
         parent = slice(6 * joint.parent, 6 * joint.parent + 6)
         P[k, parent] = -G[k, parent]
     return P
-
-
-def link_matrix(robot: Robot, body: Array, joints: Constraints | None = None) -> Array:
-    """Returns the mass matrix (114, 114) of the links alone, without rotors."""
-    return mass_matrix(replace(robot, servo=replace(robot.servo, rotor_inertia=0.0)), body, joints)
 
 
 def spin_inertia(servo: Servo) -> float:
@@ -280,7 +184,8 @@ def external_torques(
     kinematic = robot.servo.mode == "kinematic"
     driven = drive_acceleration(robot, body, command).ravel() if kinematic else turns[0] * 0.0
     bias = np.linalg.solve(fixed, np.concatenate([np.zeros(6), c, driven]))
-    load = motion.T @ (forces - link_matrix(robot, body) @ bias)
+    links = replace(robot, servo=replace(robot.servo, rotor_inertia=0.0))
+    load = motion.T @ (forces - mass_matrix(links, body, joints) @ bias)
     return load.reshape(LEGS, JOINTS) + stop_torques(robot, body)
 
 
@@ -380,17 +285,3 @@ def accelerations(
     motor = -drive.reshape(LEGS, JOINTS) if robot.servo.mode == "kinematic" else motor
     multipliers = multiplier.reshape(-1, MULTIPLIERS)
     return Accelerations(dv.reshape(BODIES, 6), multipliers, motor, gear)
-
-
-def joint_reactions(robot: Robot, body: Array, multipliers: Array) -> tuple[Array, Array]:
-    """Returns force (18, 3) [N] and torque (18, 3) [N m] of each joint on its child.
-
-    They are -D_j^T lambda; the torque is about the joint's point.
-    """
-    force, torque = np.zeros((LEGS * JOINTS, 3)), np.zeros((LEGS * JOINTS, 3))
-    for k, model in enumerate(joint_models(robot)):
-        joint = joint_kinematics(model, body[model.parent], body[model.child])
-        wrench = -joint.D_j.T @ multipliers[k]
-        sP_j = rotation_matrix(body[model.child, 3:7]) @ model.point_j
-        force[k], torque[k] = wrench[0:3], wrench[3:6] - cross(sP_j, wrench[0:3])
-    return force, torque

@@ -1,28 +1,42 @@
-"""Computes energies, momentum and constraint errors of all bodies."""
+"""Computes energies and momentum of all bodies, and the mobility of links and joints."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from hexapod_cosim.models.actuator import stop_energy
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import constraints
+from hexapod_cosim.models.contact.bodies import pair_contacts
 from hexapod_cosim.models.contact.forces import (
     candidates,
     contacts_at,
     open_contacts,
     shares_of_feet,
 )
-from hexapod_cosim.models.contact.pairs import pair_contacts
 from hexapod_cosim.models.dynamics import (
     carried_turns,
-    constraints,
     joint_overruns,
+    mass_matrix,
     masses,
     spin_inertia,
     world_inertias,
 )
-from hexapod_cosim.models.kinematics import joint_models, joint_speeds, rotation_matrix
+from hexapod_cosim.models.kinematics import (
+    BODIES,
+    JOINTS,
+    LEGS,
+    body_states,
+    joint_models,
+    joint_speeds,
+    rotation_matrix,
+)
 from hexapod_cosim.models.records import Robot
+
+UNKNOWNS = 6 + LEGS * JOINTS
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def kinetic_energy(robot: Robot, body: Array) -> float:
@@ -75,7 +89,32 @@ def momentum(robot: Robot, body: Array) -> tuple[Array, Array]:
     return linear.sum(axis=0), about
 
 
-def constraint_errors(robot: Robot, body: Array) -> tuple[float, float]:
-    """Returns the norms of Phi [m or 1] and of its rate [m/s or 1/s]."""
-    joints = constraints(robot, body)
-    return float(np.linalg.norm(joints.phi)), float(np.linalg.norm(joints.dphi))
+def tibia_mobility(robot: Robot) -> float:
+    """Returns the acceleration of the tibias' centres of mass per force there [1/kg], MuJoCo's
+    invweight.
+
+    It is the mean over legs and directions, at angle 0.
+    """
+    J, M = _at_zero(robot)
+    tibias = J.reshape(BODIES, 6, UNKNOWNS)[JOINTS::JOINTS, :3].reshape(-1, UNKNOWNS)
+    return float(np.mean(np.sum(tibias * np.linalg.solve(M, tibias.T).T, axis=1)))
+
+
+def joint_mobility(robot: Robot) -> Array:
+    """Returns the accelerations (6, 3) of the joints per torque [1/(kg m2)], at angle 0."""
+    _, M = _at_zero(robot)
+    return np.diag(np.linalg.inv(M))[6:].reshape(LEGS, JOINTS)
+
+
+def _at_zero(robot: Robot) -> tuple[Array, Array]:
+    """Returns the bodies' motion per speed (114, 24) and the mass matrix (24, 24), at angle 0."""
+    place, still = np.zeros(3), np.zeros((LEGS, JOINTS))
+
+    def moving(speed: Array) -> Array:
+        """Returns bodies (19, 13) at speeds of the torso (6,) and the joints (18,)."""
+        torso, joints = (speed[:3], speed[3:6]), speed[6:].reshape(LEGS, JOINTS)
+        return body_states(robot, place, UPRIGHT, *torso, still, joints)
+
+    J = np.stack([moving(speed)[:, 7:13].ravel() for speed in np.eye(UNKNOWNS)], axis=-1)
+    plain = replace(robot, servo=replace(robot.servo, gear_ratio=0.0))
+    return J, np.asarray(J.T @ mass_matrix(plain, moving(np.zeros(UNKNOWNS))) @ J)

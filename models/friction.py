@@ -1,5 +1,5 @@
 """Defines friction: the data of a material and its laws, tanh (eq. 15, 35), elasto-plastic bristles
-(eq. 16-18) and LuGre (eq. 36, 37), and the moments of spin and rolling (eq. 38).
+(eq. 16-18) and LuGre (eq. 36, 37).
 
 Velocities and deflections lie along the ground, in world axes. A law is a function and its row in
 LAWS.
@@ -56,7 +56,7 @@ class Friction:
     @property
     def creeps(self) -> bool:
         """Whether a foot creeps under any force along the ground."""
-        return LAWS[self.law].creeps
+        return LAWS[self.law].creep is not None
 
 
 @dataclass(frozen=True)
@@ -241,11 +241,6 @@ class FrictionLaw:
         """Whether a foot stands on bristles."""
         return self.sliding is not None
 
-    @property
-    def creeps(self) -> bool:
-        """Whether a foot creeps under any force along the ground."""
-        return self.creep is not None
-
 
 # in the order of their numbers in the FMU, so that a new law is the last one
 LAWS = {
@@ -282,39 +277,3 @@ def yielding_velocity(friction: Friction, slip: Array, bristle: Array) -> Array:
 def bristle_rate(friction: Friction, slip: Array, bristle: Array) -> Array:
     """Returns db/dt (3,) [m/s] of a closed foot's bristles (eq. 16, 36); 0 without bristles."""
     return slip - yielding_velocity(friction, slip, bristle)
-
-
-# moments
-
-
-def turning_slopes(
-    friction: Friction, radius: float, normal: Array, turn: Array
-) -> tuple[float, float]:
-    """Returns the moments of spin and rolling friction over load and angular speed [m s] (eq. 38).
-
-    radius: that of the sphere [m]; its speeds R |w_n| and R |w_t| regularise the moments.
-    normal: (3,) of the ground; turn: angular velocity (3,) [rad/s].
-    """
-    direction = LAWS[friction.law].direction
-    spin = float(normal @ turn)
-    slow = radius * abs(spin)
-    fast = radius * float(np.linalg.norm(turn - spin * normal))
-    return (
-        friction.spin_radius
-        * radius
-        * sliding_friction(friction, slow)
-        * direction(friction, slow),
-        friction.rolling_radius * radius * direction(friction, fast),
-    )
-
-
-def turning_moment(
-    friction: Friction, radius: float, load: float, normal: Array, turn: Array
-) -> Array:
-    """Returns the moment (3,) [N m] of spin and rolling friction at a load [N] (eq. 38).
-
-    The other arguments are those of `turning_slopes`.
-    """
-    spin, roll = turning_slopes(friction, radius, normal, turn)
-    about = float(normal @ turn) * normal
-    return -load * (spin * about + roll * (turn - about))

@@ -26,6 +26,7 @@ from hexapod_cosim.models.kinematics import (
     joint_angles,
     joint_speeds,
 )
+from hexapod_cosim.models.method import cubic
 from hexapod_cosim.models.records import Robot
 
 # nodes of a step for the forces of feet; motors use every second one
@@ -158,20 +159,6 @@ def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Imp
     return time
 
 
-def cubic(
-    start: Array, slope_start: Array, rise: Array, slope_end: Array, x: Array
-) -> tuple[Array, Array, Array]:
-    """Returns value, first and second derivative at x (nodes,) in [0, 1] of cubics (eq. 28).
-
-    The cubics are given by values and rates per step at both ends.
-    """
-    bend = slope_start + slope_end - 2.0 * rise
-    curve = rise - slope_start - bend
-    x = x.reshape(-1, *(1 for _ in np.shape(start)))
-    value = start + x * (slope_start + x * (curve + x * bend))
-    return value, slope_start + x * (2.0 * curve + 3.0 * x * bend), 2.0 * curve + 6.0 * x * bend
-
-
 def measured_step(
     robot: Robot,
     before: Array,
@@ -294,8 +281,7 @@ def _under_load(robot: Robot, h: float, force: Array, speed: Array) -> Array:
 
     The force is linear between nodes; load is a force above LOAD_SHARE of the weight.
     """
-    mass = robot.torso.mass + sum(link.mass for leg in robot.legs for link in leg.links)
-    above = force - LOAD_SHARE * mass * float(np.linalg.norm(robot.gravity))
+    above = force - LOAD_SHARE * robot.total_mass * float(np.linalg.norm(robot.gravity))
     total = np.zeros(LEGS)
     for (a, b), (v, w) in zip(pairwise(above), pairwise(speed), strict=True):
         crossing = np.abs(a) / np.maximum(np.abs(a) + np.abs(b), 1e-300)

@@ -1,5 +1,5 @@
-"""Defines the integration methods by their coefficients: explicit Runge-Kutta and linearly implicit
-Rosenbrock-W.
+"""Defines the integrator's settings, and its methods by their coefficients: explicit Runge-Kutta
+and linearly implicit Rosenbrock-W; and cubics through the ends of a step.
 
 plant_fmu/src/method.c contains the same coefficients.
 """
@@ -9,12 +9,35 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.schema import Choice, Number
+
+PROJECTIONS = ("none", "step")
 
 Stage = Callable[[float, Array, Array], Array]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Baumgarte:
+    """Baumgarte stabilisation of the constraints (eq. 1)."""
+
+    alpha: Annotated[float, Number("1/s", at_least=0.0)]
+    beta: Annotated[float, Number("1/s", at_least=0.0)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solver:
+    """Settings of the integrator."""
+
+    method: Annotated[str, Choice(METHODS)]
+    step: Annotated[float, Number("s", at_least=0.0)]  # 0: error control
+    tolerance: Annotated[float, Number("1", above=0.0, below=1.0)]
+    step_max: Annotated[float, Number("s", above=0.0)]
+    projection: Annotated[str, Choice(PROJECTIONS)] = "none"
 
 
 @dataclass(frozen=True)
@@ -125,3 +148,36 @@ METHOD: dict[str, Method] = {
         e=[71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40],
     ),
 }
+METHODS = tuple(METHOD)
+
+
+# cubics
+
+
+def cubic(
+    start: Array, slope_start: Array, rise: Array, slope_end: Array, x: Array
+) -> tuple[Array, Array, Array]:
+    """Returns value, first and second derivative at x (nodes,) in [0, 1] of cubics (eq. 28).
+
+    The cubics are given by values and rates per step at both ends.
+    """
+    bend = slope_start + slope_end - 2.0 * rise
+    curve = rise - slope_start - bend
+    x = x.reshape(-1, *(1 for _ in np.shape(start)))
+    value = start + x * (slope_start + x * (curve + x * bend))
+    return value, slope_start + x * (2.0 * curve + 3.0 * x * bend), 2.0 * curve + 6.0 * x * bend
+
+
+def deepest(start: float, slope_start: float, end: float, slope_end: float) -> float:
+    """Returns the largest value on [0, 1] of the cubic with these ends and slopes (eq. 28)."""
+    if not (slope_start > 0.0 and slope_end < 0.0):
+        return max(start, end)
+    bend = slope_start + slope_end - 2.0 * (end - start)
+    curve = end - start - slope_start - bend
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        x = 0.5 * (low + high)
+        rises = slope_start + x * (2.0 * curve + 3.0 * x * bend) > 0.0
+        low, high = (x, high) if rises else (low, x)
+    top = start + low * (slope_start + low * (curve + low * bend))
+    return max(top, start, end)

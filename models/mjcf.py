@@ -20,20 +20,16 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array, Vector3
-from hexapod_cosim.models.dynamics import mass_matrix
+from hexapod_cosim.models.energy import joint_mobility, tibia_mobility
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.kinematics import (
-    BODIES,
-    JOINTS,
     LEGS,
     axis_quaternion,
-    body_states,
     foot_positions,
     quaternion_product,
     rotation_matrix,
@@ -52,10 +48,8 @@ STOP_IMPEDANCE = 0.001
 DRAWN = {"contype": "0", "conaffinity": "0", "group": "1", "mass": "0"}
 # geometry that touches the ground only
 GROUNDED = {"contype": "0", "conaffinity": "1", "mass": "0"}
-UNKNOWNS = 6 + LEGS * JOINTS
 Z = np.array([0.0, 0.0, 1.0])
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-ZERO = np.zeros((LEGS, JOINTS))  # rad, rad/s
 GROUND = "5 5 0.1"  # m    half sizes of the drawn plane and its grid
 
 
@@ -169,43 +163,6 @@ def _solref(robot: Robot) -> str:
     return joined((max(product / damping, 2.0 * TIME_STEP), damping))
 
 
-def tibia_mobility(robot: Robot) -> float:
-    """Returns the acceleration of the tibias' centres of mass per force there [1/kg], MuJoCo's
-    invweight.
-
-    It is the mean over legs and directions, at angle 0.
-    """
-    J, M = _at_zero(robot)
-    tibias = J.reshape(BODIES, 6, UNKNOWNS)[JOINTS::JOINTS, :3].reshape(-1, UNKNOWNS)
-    return float(np.mean(np.sum(tibias * np.linalg.solve(M, tibias.T).T, axis=1)))
-
-
-def joint_mobility(robot: Robot) -> Array:
-    """Returns the accelerations (6, 3) of the joints per torque [1/(kg m2)], at angle 0."""
-    _, M = _at_zero(robot)
-    return np.diag(np.linalg.inv(M))[6:].reshape(LEGS, JOINTS)
-
-
-def _at_zero(robot: Robot) -> tuple[Array, Array]:
-    """Returns the bodies' motion per speed (114, 24) and the mass matrix (24, 24), at angle 0."""
-    J = np.stack(
-        [_motion(robot, speed).ravel() for speed in np.eye(UNKNOWNS)], axis=-1
-    )  # (114, 24)
-    body = body_states(robot, np.zeros(3), UPRIGHT, np.zeros(3), np.zeros(3), ZERO, ZERO)
-    plain = replace(robot, servo=replace(robot.servo, gear_ratio=0.0))
-    return J, np.asarray(J.T @ mass_matrix(plain, body) @ J)
-
-
-def _motion(robot: Robot, speed: Array) -> Array:
-    """Returns velocities and angular velocities (19, 6) of the bodies at angle 0.
-
-    speed (24,): the torso's (6,) and the joints' (18,).
-    """
-    return body_states(
-        robot, np.zeros(3), UPRIGHT, speed[:3], speed[3:6], ZERO, speed[6:].reshape(LEGS, JOINTS)
-    )[:, 7:13]
-
-
 def _inertial(body: ET.Element, mass: float, com: Vector3, inertia: Iterable[float]) -> None:
     add(body, "inertial", pos=com, mass=mass, fullinertia=inertia)
 
@@ -272,15 +229,10 @@ def _foot(tibia: ET.Element, leg: Leg, robot: Robot, place: Vector3) -> None:
 
 def _tibia_spheres(tibia: ET.Element, leg: Leg, robot: Robot) -> None:
     """Adds the spheres of knee and shank."""
-    body = robot.body
-    for name, radius, share in (
-        ("knee", body.knee_radius, 0.0),
-        ("shank", body.shank_radius, body.shank_position),
-    ):
-        if radius > 0.0:
-            place = joined(share * value for value in leg.links[-1].tip)
-            sphere = {"name": f"{leg.name}_{name}", "type": "sphere", "size": repr(radius)}
-            add(tibia, "geom", _body_attributes(robot) | sphere | {"pos": place})
+    for name, radius, share in robot.body.tibia_spheres:
+        place = joined(share * value for value in leg.links[-1].tip)
+        sphere = {"name": f"{leg.name}_{name}", "type": "sphere", "size": repr(radius)}
+        add(tibia, "geom", _body_attributes(robot) | sphere | {"pos": place})
 
 
 def _hinge(body: ET.Element, name: str, link: Link, robot: Robot, mobility: float) -> None:

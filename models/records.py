@@ -17,27 +17,18 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from hexapod_cosim.models import arrays
-from hexapod_cosim.models.contact.law import Contact
+from hexapod_cosim.models.arrays import Array, Vector3, Vector6
+from hexapod_cosim.models.contact.law import BodyContact, Contact
 from hexapod_cosim.models.friction import Friction
-from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.surface import Terrain
+from hexapod_cosim.models.method import Baumgarte, Solver
 from hexapod_cosim.models.schema import Choice, Number, Texts, Vector
-
-Array = arrays.Array
-Vector3 = arrays.Vector3
-Vector6 = arrays.Vector6
+from hexapod_cosim.models.soil.presets import Soil
 
 LEG_NAMES = ("LF", "LM", "LR", "RF", "RM", "RR")
 JOINT_NAMES = ("coxa", "femur", "tibia")
 SERVO_MODES = ("position", "torque", "kinematic")
 SERVO_DRIVES = ("line", "motor")
-METHODS = ("rosw3", "ros2", "dp54")
-PROJECTIONS = ("none", "step")
-BODY_CONTACTS = ("off", "on")
-SELF_CONTACTS = ("off", "warn", "force")
-TERRAINS = ("flat", "slope", "grid")
-PLANES = ("flat", "slope")  # kinds of ground without a surface
-SOIL_LAWS = ("none", "bekker", "granular", "mud")
 GAITS = ("tripod", "ripple", "wave", "amble")
 
 
@@ -117,28 +108,6 @@ class Foot:
     pad_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
     youngs_modulus: Annotated[float, Number("Pa", above=0.0)]
     poisson: Annotated[float, Number("1", above=-1.0, at_most=0.5)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class BodyContact:
-    """Spheres that touch the ground besides the feet; parts of size 0 do not.
-
-    The radii of knee and shank are also those of femur and tibia, as capsules, in the distances
-    between neighbouring legs, which do not depend on `contact`.
-    """
-
-    contact: Annotated[str, Choice(BODY_CONTACTS)] = "off"
-    # whether a run warns of neighbouring legs that overlap, or these push each other
-    self_contact: Annotated[str, Choice(SELF_CONTACTS)] = "off"
-    # half edges of a box along the torso's axes, with a sphere around each corner
-    torso_box: Annotated[Vector3, Vector("m", 3)] = (0.0, 0.0, 0.0)
-    # centre of the box, from the torso's origin
-    torso_centre: Annotated[Vector3, Vector("m", 3)] = (0.0, 0.0, 0.0)
-    corner_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
-    knee_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
-    shank_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
-    # of the shank's sphere: 0 at the tibia's joint, 1 at the foot's centre
-    shank_position: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,82 +200,13 @@ def _unused_fields(servo: Servo) -> list[str]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Baumgarte:
-    """Baumgarte stabilisation of the constraints (eq. 1)."""
-
-    alpha: Annotated[float, Number("1/s", at_least=0.0)]
-    beta: Annotated[float, Number("1/s", at_least=0.0)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Solver:
-    """Settings of the integrator."""
-
-    method: Annotated[str, Choice(METHODS)]
-    step: Annotated[float, Number("s", at_least=0.0)]  # 0: error control
-    tolerance: Annotated[float, Number("1", above=0.0, below=1.0)]
-    step_max: Annotated[float, Number("s", above=0.0)]
-    projection: Annotated[str, Choice(PROJECTIONS)] = "none"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Terrain:
-    """The ground: level, a slope that rises by `incline` along `heading`, or a surface.
-
-    The heights of a surface are above `height`. Files give the name of the surface as `kind`, which
-    is "grid" here.
-    """
-
-    kind: Annotated[str, Choice(TERRAINS)]
-    height: Annotated[float, Number("m")] = 0.0
-    incline: Annotated[float, Number("rad", above=-math.pi / 2, below=math.pi / 2)] = 0.0
-    heading: Annotated[float, Number("rad")] = 0.0
-    surface: Surface | None = None  # of the kind grid; other kinds do not use it
-
-    @property
-    def name(self) -> str:
-        """The kind as files give it: flat, slope or the name of a surface."""
-        if self.kind != "grid" or self.surface is None:
-            return self.kind
-        return str(self.surface.recipe.get("kind", self.surface.name))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Soil:
-    """Law of soft ground and its numbers (eq. 40-46); each law uses those it names."""
-
-    law: Annotated[str, Choice(SOIL_LAWS)] = "none"
-    # bekker: pressure (Kc/b + Kphi) z^n
-    frictional_modulus: Annotated[float, Number("N/m^(n+2)", at_least=0.0)] = 0.0
-    cohesive_modulus: Annotated[float, Number("N/m^(n+1)", at_least=0.0)] = 0.0
-    exponent: Annotated[float, Number("1", at_least=0.05, at_most=3.0)] = 1.0
-    # granular: resistances of plates in units of `resistance`: facing down and moving down, on
-    # edge and moving down, on edge and moving ahead
-    resistance: Annotated[float, Number("N/m^3", at_least=0.0)] = 0.0
-    alpha_down: Annotated[float, Number("1", at_least=0.0)] = 1.0
-    alpha_side: Annotated[float, Number("1", at_least=0.0)] = 0.128
-    alpha_ahead: Annotated[float, Number("1", at_least=0.0)] = 0.37
-    # mud: pressure yield_pressure + hardening z
-    yield_pressure: Annotated[float, Number("Pa", at_least=0.0)] = 0.0
-    hardening: Annotated[float, Number("Pa/m", at_least=0.0)] = 0.0
-    # all laws: shear strength, its displacement K, stiffness of unloading, damping
-    cohesion: Annotated[float, Number("Pa", at_least=0.0)] = 0.0
-    friction_angle: Annotated[float, Number("rad", at_least=0.0, at_most=1.4)] = 0.0
-    shear_displacement: Annotated[float, Number("m", at_least=1e-5, at_most=1.0)] = 0.01
-    stiffness: Annotated[float, Number("Pa/m", above=0.0)] = 4e8
-    damping: Annotated[float, Number("Pa s/m", at_least=0.0)] = 3e4
-
-
-@dataclass(frozen=True, kw_only=True)
 class Gait:
     """Parameters of the gait."""
 
     name: Annotated[str, Choice(GAITS)]
     period: Annotated[float, Number("s", above=0.0)]
     duty: Annotated[float, Number("1", above=0.0, below=1.0)]
-    stride: Annotated[
-        float, Number("m", at_least=0.0)
-    ]  # distance that the body moves in one period
+    stride: Annotated[float, Number("m", at_least=0.0)]  # of the body in one period
     step_height: Annotated[float, Number("m", above=0.0)]
 
 
@@ -338,7 +238,7 @@ class Robot:
     terrain: Terrain
     gait: Gait
     body: BodyContact = field(default_factory=BodyContact)
-    soil: Soil = Soil()
+    soil: Soil = field(default_factory=Soil)
     joints: JointNames = field(default=JointNames(), compare=False)
     source: Mapping[str, str] = field(default_factory=dict, compare=False)
 

@@ -21,23 +21,21 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.models.arrays import Vector3, Vector6
-from hexapod_cosim.models.contact.law import Contact
+from hexapod_cosim.models.contact.law import BodyContact, Contact
 from hexapod_cosim.models.errors import RobotError, refuse_path, unknown_name
-from hexapod_cosim.models.files import read_text
+from hexapod_cosim.models.files import parse_toml, read_text, reading_toml
 from hexapod_cosim.models.friction import Friction
-from hexapod_cosim.models.ground.table import beside, read_terrain
+from hexapod_cosim.models.ground.surface import Terrain
+from hexapod_cosim.models.ground.table import read_terrain, terrain_beside
 from hexapod_cosim.models.records import (
     JOINT_NAMES,
     LEG_NAMES,
-    BodyContact,
     Foot,
     JointNames,
     Leg,
     Link,
     Robot,
     Servo,
-    Soil,
-    Terrain,
     Torso,
 )
 from hexapod_cosim.models.schema import (
@@ -46,14 +44,12 @@ from hexapod_cosim.models.schema import (
     Vector,
     expect_table,
     missing_key,
-    parse_toml,
     read_given,
-    reading_toml,
     refuse_unknown_keys,
     require,
 )
 from hexapod_cosim.models.servos.presets import servo_table
-from hexapod_cosim.models.soil.presets import soil_table
+from hexapod_cosim.models.soil.presets import Soil, soil_table
 from hexapod_cosim.models.urdf.table import SECTIONS, element_named, side_table, urdf_table
 from hexapod_cosim.models.validation import check_robot
 
@@ -79,16 +75,10 @@ def load_robot(path_or_name: str | Path) -> Robot:
         alone = _robot_from_text(text, str(path))
     if alone is not None:
         return alone
-    table = _terrain_beside(parse_toml(text), path.parent)
+    table = terrain_beside(parse_toml(text), path.parent)
     if "urdf" in table:
         return _robot_from_urdf(side_table(table, path.parent, str(path)), str(path))
     return robot_from_table(table, where=str(path))
-
-
-def _terrain_beside(table: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Returns a file's tables with the path of a height map relative to a folder resolved."""
-    terrain = table.get("terrain")
-    return table | {"terrain": beside(terrain, folder)} if isinstance(terrain, dict) else table
 
 
 @lru_cache(maxsize=64)

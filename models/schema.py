@@ -6,22 +6,15 @@ units or a quantity with its unit ("5 ms").
 
 from __future__ import annotations
 
-import codecs
 import math
 import re
-import tomllib
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from copy import deepcopy
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
-from pathlib import Path
 from typing import Any, cast, get_type_hints
 
-from hexapod_cosim.models.errors import HexapodError, RobotError, unknown_name
+from hexapod_cosim.models.errors import RobotError, unknown_name
 
-DEEPEST = 64  # the most tables and arrays inside each other in a TOML file
-LARGEST = 2**63 - 1  # the largest integer of TOML 1.0
 # SI unit of a key -> units that may be written for it, each with its size in the SI unit
 SCALES: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
@@ -36,102 +29,6 @@ SCALES: dict[str, dict[str, float]] = {
     "s/m": {"s/m": 1.0, "s/mm": 1e3},
 }
 QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*")
-
-
-def parse_toml(text: str) -> dict[str, Any]:
-    """Returns the tables of a TOML text.
-
-    Raises tomllib.TOMLDecodeError, also for integers of more than 64 bits and for tables and arrays
-    more than DEEPEST deep, where Python's reader raises other errors or none.
-    """
-    try:
-        table = tomllib.loads(text)
-        _check_size(table, DEEPEST)
-    except tomllib.TOMLDecodeError:
-        raise
-    except RecursionError as error:
-        raise tomllib.TOMLDecodeError(f"more than {DEEPEST} tables or arrays deep") from error
-    except ValueError as error:  # thousands of digits
-        raise tomllib.TOMLDecodeError("an integer of more than 64 bits") from error
-    return table
-
-
-@contextmanager
-def decoding_toml(path: Path, *, kind: str, error: type[HexapodError]) -> Iterator[None]:
-    """Turns errors of a TOML file's encoding and of parse_toml() into the class `error`.
-
-    Args:
-        path: the file.
-        kind: of the file, as in "the path of a robot file".
-        error: the class.
-    """
-    try:
-        yield
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as cause:
-        other = _other_format(path)
-        what = "not a TOML file"
-        got = other or str(cause)
-        expected = "TOML 1.0 in UTF-8"
-        fix = "correct that line" if other is None else f"give the path of a {kind} file"
-        raise error(what, got=got, expected=expected, fix=fix, where=str(path)) from cause
-
-
-@contextmanager
-def reading_toml(
-    path: Path,
-    *,
-    kind: str,
-    name: str,
-    names: Callable[[], Iterable[str]],
-    error: type[HexapodError],
-) -> Iterator[None]:
-    """Turns errors of reading a TOML file, of its encoding and of parse_toml() into one class.
-
-    Args:
-        path: the file.
-        kind: of the file, as in "the path of a robot file".
-        name: of what is read, with its article.
-        names: returns the bundled files, which a message lists.
-        error: the class.
-    """
-    try:
-        with decoding_toml(path, kind=kind, error=error):
-            yield
-    except OSError as cause:
-        fix = f"give the path of a {kind} file, or one of: " + ", ".join(names())
-        raise error(f"cannot read {name}", got=cause.strerror, fix=fix, where=str(path)) from cause
-
-
-def _other_format(path: Path) -> str | None:
-    """Returns the format of a file that is often given by mistake, by its first bytes, or None."""
-    with path.open("rb") as file:
-        start = file.read(256).removeprefix(codecs.BOM_UTF8).lstrip()
-    if start.startswith(b"PK\x03\x04"):
-        return "a ZIP file, such as an FMU"
-    if start.startswith(b"<"):
-        return "an XML file, such as a URDF without the ending .urdf or a MuJoCo model"
-    return "a binary file" if b"\0" in start else None
-
-
-def _check_size(value: Any, depth: int) -> None:
-    """Raises ValueError for large integers and RecursionError below the given depth."""
-    if depth < 0:
-        raise RecursionError
-    if isinstance(value, int) and abs(value) > LARGEST:
-        raise ValueError
-    inner = value.values() if isinstance(value, dict) else value
-    for item in inner if isinstance(value, dict | list) else ():
-        _check_size(item, depth - 1)
-
-
-def merged_tables(low: Mapping[str, Any], high: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns a copy of the entries of two nested tables; those of `high` take precedence."""
-    both = {
-        key: merged_tables(low[key], high[key])
-        for key in low
-        if isinstance(low[key], Mapping) and isinstance(high.get(key), Mapping)
-    }
-    return deepcopy({**low, **high, **both})
 
 
 @dataclass(frozen=True)
@@ -359,16 +256,16 @@ def read_given(
 
 
 def require(record: type[Any], given: dict[str, Any], where: str) -> dict[str, Any]:
-    """Returns all fields of the record, given ones and defaults.
+    """Returns the given fields of the record.
 
-    Raises RobotError for a missing one.
+    Raises RobotError for a missing one without a default.
     """
-    usual = {item.name: item.default for item in fields(record) if item.default is not MISSING}
-    values = {key: usual[key] for key in specs(record) if key in usual} | given
-    for key, spec in specs(record).items():
-        if key not in values:
-            raise missing_key(key, spec, f"{where}.{key}")
-    return values
+    known = specs(record)
+    for item in fields(record):
+        usual = item.default is not MISSING or item.default_factory is not MISSING
+        if item.name in known and item.name not in given and not usual:
+            raise missing_key(item.name, known[item.name], f"{where}.{item.name}")
+    return given
 
 
 def read_record(record: type[Any], table: Any, where: str) -> Any:
@@ -376,12 +273,7 @@ def read_record(record: type[Any], table: Any, where: str) -> Any:
 
     Raises RobotError.
     """
-    given = read_given(record, table, where)
-    for item in fields(record):
-        required = item.default is MISSING and item.default_factory is MISSING
-        if required and item.name not in given:
-            raise missing_key(item.name, specs(record)[item.name], f"{where}.{item.name}")
-    return record(**given)
+    return record(**require(record, read_given(record, table, where), where))
 
 
 def missing_key(key: str, spec: Spec, where: str) -> RobotError:

@@ -15,27 +15,25 @@ import numpy as np
 
 from hexapod_cosim.models.actuator import gear_drag, servo_slopes, servo_torque, stop_slopes
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import constraints
 from hexapod_cosim.models.contact.forces import (
     Candidate,
     Contacts,
-    ContactState,
     closed_contacts,
     contact_bristle_rate,
-    contacts_of,
-    has_bristles,
 )
 from hexapod_cosim.models.contact.geometry import (
     FootContact,
     contact_jacobian,
     contact_matrices,
     slip_velocity,
+    turning_slopes,
 )
-from hexapod_cosim.models.contact.law import normal_force, normal_slopes
+from hexapod_cosim.models.contact.law import ContactState, normal_force, normal_slopes
 from hexapod_cosim.models.dynamics import (
     Command,
     applied_forces,
     constraint_equations,
-    constraints,
     external_torques,
     gear_loads,
     joint_overruns,
@@ -45,7 +43,7 @@ from hexapod_cosim.models.dynamics import (
     stop_torques,
 )
 from hexapod_cosim.models.friction import friction_drag as foot_drag
-from hexapod_cosim.models.friction import friction_grip, turning_slopes
+from hexapod_cosim.models.friction import friction_grip
 from hexapod_cosim.models.kinematics import BODIES, JOINTS, LEGS, joint_angles, joint_speeds
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.servos.motor import friction_drag, has_measured_friction
@@ -87,20 +85,13 @@ class StageRate:
 
 
 def keep_slopes(
-    robot: Robot,
-    body: Array,
-    bristle: Array,
-    command: Command,
-    damping: Array | Contacts,
-    ahead: float,
+    robot: Robot, body: Array, bristle: Array, command: Command, contacts: Contacts, ahead: float
 ) -> Slopes:
     """Returns the derivatives of the forces at bodies (19, 13) and bristles (6, 3).
 
     The contacts' are taken at delta + ahead max(ddelta, 0), because a foot that has just touched
-    down has neither depth nor derivatives yet, and W would miss its contact. damping: (6,) of the
-    feet [s/m], nan for open ones, or the state of all contacts.
+    down has neither depth nor derivatives yet, and W would miss its contact.
     """
-    contacts = damping if isinstance(damping, Contacts) else contacts_of(robot, damping)
     angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
     references = (command.angle_ref, command.speed_ref, command.torque_ref)
     motor = servo_slopes(robot.servo, angle, speed, *references, power=command.power)
@@ -218,7 +209,7 @@ def sole_bristles(
     """Returns the bristles of all closed soles that have some."""
     found = []
     for k, point, state, contact in closed_contacts(robot, body, contacts):
-        if point.is_sole and has_bristles(state):
+        if point.is_sole and state.has_bristles:
             across = np.eye(3) - np.outer(contact.normal, contact.normal)
             T = across @ contact_jacobian(body, point.sphere.body, contact)
             rate = contact_bristle_rate(state, contact, bristle[point.leg])
@@ -231,7 +222,7 @@ def solve_stage(
     body: Array,
     bristle: Array,
     command: Command,
-    damping: Array | Contacts,
+    contacts: Contacts,
     slopes: Slopes,
     z: float,
     change: tuple[Array, Array, Array],
@@ -241,12 +232,11 @@ def solve_stage(
     Args:
         robot, command: as in `accelerations`.
         body, bristle: y_i of the stage.
-        damping: as in `keep_slopes`.
+        contacts: the state of all contacts.
         slopes: those of the step's first stage.
         z: h gamma [s]; 0 for explicit methods.
         change: s_x (114,), s_v (114,) and s_b (6, 3), the sums of g_ij k_j over earlier stages.
     """
-    contacts = damping if isinstance(damping, Contacts) else contacts_of(robot, damping)
     s_x, s_v, s_b = change
     v, joints = body[:, 7:13].ravel(), constraints(robot, body)
     G = joints.G

@@ -21,33 +21,29 @@ from functools import lru_cache
 
 import numpy as np
 
-from hexapod_cosim.models.actuator import overrun, servo_torque, stop_torque
 from hexapod_cosim.models.arrays import Array
-from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force, foot_moment
-from hexapod_cosim.models.dynamics import masses
+from hexapod_cosim.models.equilibrium import (
+    attitude,
+    creep_velocity,
+    deflections,
+    foot_forces,
+    imbalance,
+    imbalance_slopes,
+    leg_loads,
+    moving_bodies,
+    start_unknowns,
+)
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.ground.faces import ground, ground_height, ground_normal, surface_of
-from hexapod_cosim.models.kinematics import (
-    JOINTS,
-    LEGS,
-    axis_quaternion,
-    body_states,
-    cross,
-    foot_centres,
-    joint_models,
-    quaternion_product,
-    rotation_matrix,
-)
-from hexapod_cosim.models.records import Baumgarte, Gait, Robot, Solver
+from hexapod_cosim.models.kinematics import JOINTS, LEGS, body_states, foot_centres
+from hexapod_cosim.models.method import Baumgarte, Solver
+from hexapod_cosim.models.records import Gait, Robot
 
 RESIDUAL = 1e-9  # N, N m  about 1e4 times the rounding of such forces
 ITERATIONS = 60
-DIFFERENCE = 1e-7  # 1  step of the Jacobian's differences
 LEVEL = 1e-12  # 1  of gravity; a smaller part along the ground is rounding
 LEAST_RISE = 1e-13  # m
 UP = np.array([0.0, 0.0, 1.0])
-TORSO = 6  # the torso's unknowns and residuals
-UNKNOWNS = TORSO + LEGS * JOINTS
 
 
 @dataclass(frozen=True)
@@ -100,10 +96,8 @@ def _standing_key(robot: Robot) -> Robot:
     These are the integrator, the gait and, on level ground, friction. The result is the key of the
     cache.
     """
-    friction, calm = (
-        robot.friction,
-        Solver(method="rosw3", step=0.0, tolerance=1e-4, step_max=1.0, projection="none"),
-    )
+    friction = robot.friction
+    calm = Solver(method="rosw3", step=0.0, tolerance=1e-4, step_max=1.0, projection="none")
     gravity, normal = np.array(robot.gravity), ground_normal(robot.terrain)
     press = -float(gravity @ normal)
     level = float(np.linalg.norm(gravity + press * normal)) <= LEVEL * press
@@ -182,20 +176,18 @@ def _cached_standing(given: Robot) -> Standing:
     """Solves for the equilibrium of a robot of `_standing_key`."""
     slide = _slide_acceleration(given)
     robot = _in_sliding_frame(given, slide) if slide.any() else given
-    x = _start(robot)
-    loads = _loads(robot, x)
+    x = start_unknowns(robot)
+    loads = leg_loads(robot, x)
     for _ in range(ITERATIONS):
-        if np.max(np.abs(_residual(robot, loads))) < RESIDUAL:
-            pose = (
-                _standing(robot, x)
-                if not slide.any()
-                else _sliding(given, _standing(robot, x), slide)
-            )
+        if np.max(np.abs(imbalance(robot, loads))) < RESIDUAL:
+            pose = _standing(robot, x)
+            if slide.any():
+                pose = _sliding(given, pose, slide)
             for array in vars(pose).values():
                 array.flags.writeable = False
             return pose
         x, loads = _newton_step(robot, x, loads)
-    raise _no_equilibrium(robot, _residual(robot, loads))
+    raise _no_equilibrium(robot, imbalance(robot, loads))
 
 
 def _no_equilibrium(robot: Robot, residual: Array) -> RobotError:
@@ -212,187 +204,30 @@ def _newton_step(robot: Robot, x: Array, loads: Array) -> tuple[Array, Array]:
 
     Feet that lose the ground after too long a step have no derivatives.
     """
-    residual = _residual(robot, loads)
+    residual = imbalance(robot, loads)
     try:
-        step = np.linalg.solve(_jacobian(robot, x, loads), -residual)
+        step = np.linalg.solve(imbalance_slopes(robot, x, loads), -residual)
     except np.linalg.LinAlgError as error:
         raise _no_equilibrium(robot, residual) from error
     for shorter in 0.5 ** np.arange(30):
-        trial = _loads(robot, x + shorter * step)
-        if np.linalg.norm(_residual(robot, trial)) < np.linalg.norm(residual):
+        trial = leg_loads(robot, x + shorter * step)
+        if np.linalg.norm(imbalance(robot, trial)) < np.linalg.norm(residual):
             return x + shorter * step, trial
     raise _no_equilibrium(robot, residual)
-
-
-def _jacobian(robot: Robot, x: Array, loads: Array) -> Array:
-    """Returns the Jacobian (24, 24) of the residual by differences.
-
-    The loads of a leg do not depend on other legs' angles, so that all legs move at once.
-    """
-
-    def change(direction: Array) -> Array:
-        return (_loads(robot, x + DIFFERENCE * direction) - loads) / DIFFERENCE
-
-    jacobian = np.zeros((UNKNOWNS, UNKNOWNS))
-    for column, unit in enumerate(np.eye(UNKNOWNS)[:TORSO]):
-        changed = change(unit)
-        jacobian[:, column] = np.concatenate(
-            [changed[:, :TORSO].sum(axis=0), changed[:, TORSO:].ravel()]
-        )
-    for joint, unit in enumerate(np.eye(JOINTS)):
-        changed = change(np.concatenate([np.zeros(TORSO), np.tile(unit, LEGS)]))
-        for leg in range(LEGS):
-            begin = TORSO + JOINTS * leg
-            jacobian[:TORSO, begin + joint], jacobian[begin : begin + JOINTS, begin + joint] = (
-                changed[leg, :TORSO],
-                changed[leg, TORSO:],
-            )
-    return jacobian
-
-
-def _start(robot: Robot) -> Array:
-    """Returns the first unknowns: z, roll, pitch, creep (vx, vy, yaw rate), joint angles.
-
-    The robot is in its stance, parallel to the ground, with the feet at the depth that carries it.
-    """
-    x = np.zeros(UNKNOWNS)
-    normal = ground_normal(robot.terrain)
-    x[1], x[2] = -np.arcsin(normal[1]), np.arctan2(normal[0], normal[2])
-    x[6:] = robot.stance.ravel()
-    weight = robot.weight
-    depth = (weight / LEGS / robot.contact.stiffness) ** (2.0 / 3.0)
-    highest = min(foot.penetration for foot in foot_contacts(robot, _bodies(robot, x)))
-    x[0] += (highest - depth) / normal[2]
-    return x
-
-
-def _attitude(x: Array) -> Array:
-    """Returns the torso's quaternion (4,) of the unknowns."""
-    roll = axis_quaternion(np.array([1.0, 0.0, 0.0]), x[1])
-    pitch = axis_quaternion(np.array([0.0, 1.0, 0.0]), x[2])
-    return quaternion_product(pitch, roll)
-
-
-def _velocity(robot: Robot, x: Array) -> Array:
-    """Returns the creep velocity (3,) along the ground [m/s]."""
-    normal = ground_normal(robot.terrain)
-    return np.array([x[3], x[4], -(normal[0] * x[3] + normal[1] * x[4]) / normal[2]])
-
-
-def _bodies(robot: Robot, x: Array) -> Array:
-    """Returns the bodies (19, 13) of the unknowns, all moving with the creep."""
-    angle = x[6:].reshape(LEGS, JOINTS)
-    turning = x[5] * ground_normal(robot.terrain)
-    position = np.array([0.0, 0.0, x[0]])
-    return body_states(
-        robot, position, _attitude(x), _velocity(robot, x), turning, angle, np.zeros((LEGS, JOINTS))
-    )
-
-
-def _bristles(robot: Robot, body: Array) -> Array:
-    """Returns the bristles' deflections (6, 3) [m], 0 with other laws.
-
-    The unknown creep stands for the deflection: one presliding for each m/s.
-    """
-    if not robot.friction.has_bristles:
-        return np.zeros((LEGS, 3))
-    return np.array(
-        [
-            robot.friction.presliding * (foot.velocity + foot.approach_speed * foot.normal)
-            for foot in foot_contacts(robot, body)
-        ]
-    )
-
-
-def _foot_forces(robot: Robot, body: Array) -> Array:
-    """Returns the forces (6, 3) of the ground on the feet [N]; feet with bristles are at rest."""
-    feet, bristle = foot_contacts(robot, body), _bristles(robot, body)
-    if robot.friction.has_bristles:
-        feet = tuple(replace(foot, velocity=np.zeros(3), approach_speed=0.0) for foot in feet)
-    return np.array([foot_force(robot, foot, 0.0, bristle[leg]) for leg, foot in enumerate(feet)])
-
-
-def _residual(robot: Robot, loads: Array) -> Array:
-    """Returns the residual (24,): force and moment on the torso, and the unbalanced torque of each
-    joint.
-
-    For kinematic drives the last are the deviations from the stance [rad].
-    """
-    weight = robot.torso.mass * np.array([*robot.gravity, 0.0, 0.0, 0.0])
-    return np.concatenate([weight + loads[:, :TORSO].sum(axis=0), loads[:, TORSO:].ravel()])
-
-
-def _loads(robot: Robot, x: Array) -> Array:
-    """Returns (6, 9): each leg's force and moment on the torso, and its joints' residuals.
-
-    Force and moment act at the torso's centre of mass, world axes.
-    """
-    body = _bodies(robot, x)
-    force = masses(robot)[:, None] * np.array(robot.gravity)
-    moment = np.zeros_like(force)
-    for leg, (foot, push) in enumerate(
-        zip(foot_contacts(robot, body), _foot_forces(robot, body), strict=True)
-    ):
-        tibia = JOINTS * (leg + 1)
-        force[tibia] += push
-        moment[tibia] += cross(foot.point - body[tibia, 0:3], push)
-        if not robot.friction.has_bristles:
-            moment[tibia] += foot_moment(robot, foot, 0.0, body[tibia, 10:13])
-    on_torso, left_over = _carry_to_torso(robot, body, force, moment)
-    angle = x[TORSO:]
-    if robot.servo.mode == "kinematic":
-        left_over = robot.stance.ravel() - angle
-    else:
-        servo, zero = replace(robot.servo, mode="position"), np.zeros_like(angle)
-        left_over += servo_torque(servo, angle, zero, robot.stance.ravel(), zero, zero)
-        past = overrun(angle, robot.angle_min.ravel(), robot.angle_max.ravel())
-        left_over += stop_torque(servo, past, zero)
-    return np.column_stack([on_torso, left_over.reshape(LEGS, JOINTS)])
-
-
-def _carry_to_torso(robot: Robot, body: Array, force: Array, moment: Array) -> tuple[Array, Array]:
-    """Adds each link's force and moment to its parent's, leaf to root, in place.
-
-    Returns the legs' forces and moments on the torso (6, 6), and the torques about the joint axes
-    (18,).
-    """
-    on_torso, torque = np.zeros((LEGS, TORSO)), np.zeros(LEGS * JOINTS)
-    for k, joint in reversed(list(enumerate(joint_models(robot)))):
-        i, j = joint.parent, joint.child
-        R_i = rotation_matrix(body[i, 3:7])
-        sP_i = R_i @ joint.point_i
-        at_joint = moment[j] + cross(body[j, 0:3] - (body[i, 0:3] + sP_i), force[j])
-        torque[k] = at_joint @ (R_i @ joint.s_i)
-        carried = at_joint + cross(sP_i, force[j])
-        if i == 0:
-            on_torso[k // JOINTS] = np.concatenate([force[j], carried])
-        else:
-            force[i] += force[j]
-            moment[i] += carried
-    return on_torso, torque
 
 
 def _standing(robot: Robot, x: Array) -> Standing:
     """Returns the pose of rest of the unknowns."""
     position, angle = np.array([0.0, 0.0, x[0]]), x[6:].reshape(LEGS, JOINTS)
-    body = _bodies(robot, x)
-    creep = np.zeros(3) if robot.friction.has_bristles else _velocity(robot, x)
-    return Standing(
-        position,
-        _attitude(x),
-        angle,
-        creep,
-        _foot_forces(robot, body),
-        _bristles(robot, body),
-        np.zeros(3),
-    )
+    body = moving_bodies(robot, x)
+    creep = np.zeros(3) if robot.friction.has_bristles else creep_velocity(robot, x)
+    force, bristle = foot_forces(robot, body), deflections(robot, body)
+    return Standing(position, attitude(x), angle, creep, force, bristle, np.zeros(3))
 
 
 def _sliding(robot: Robot, pose: Standing, slide: Array) -> Standing:
     """Returns the pose of a sliding robot: without creep, with fully deflected bristles."""
-    way = (
-        robot.friction.presliding * slide / np.linalg.norm(slide)
-        if robot.friction.has_bristles
-        else np.zeros(3)
-    )
+    way = np.zeros(3)
+    if robot.friction.has_bristles:
+        way = robot.friction.presliding * slide / np.linalg.norm(slide)
     return replace(pose, velocity=np.zeros(3), bristle=np.tile(way, (LEGS, 1)), slide=slide)

@@ -24,7 +24,7 @@ typedef struct {
   hxCommand command[VISITS];
 } Visited;
 
-static int visit(const Walk *walk, Visited *visited) {
+static int visit(const Recording *walk, Visited *visited) {
   hxPlant *plant = hx_plant_create();
   if (!plant || hx_plant_reset(plant, &walk->definition, 0.0) != HX_OK) return 1;
   visited->plant = plant;
@@ -75,7 +75,7 @@ static int only(const char *name, int multipliers, const Visited *visited, doubl
 
 int main(int argc, char **argv) {
   static Visited visited;
-  Walk walk;
+  Recording walk;
   double sum = 0.0;
   const char *comma = "";
   if (argc != 3 && argc != 5) {

@@ -15,16 +15,17 @@
 
 #include "hexapod/hexapod.h"
 
+/* Content of a walk file: a robot, and the recorded inputs that drive it. */
 typedef struct {
   hxDefinition definition;
   int64_t n;
   double h;       /* s  input k is held over [k h, (k + 1) h) */
   hxInput *input; /* n of them */
-} Walk;
+} Recording;
 
 /* One engine. Functions return 0 on success; self points to the data of the driver. */
 typedef struct {
-  int (*prepare)(void *self, const Walk *walk, const char *method, double step);
+  int (*prepare)(void *self, const Recording *walk, const char *method, double step);
   int (*start)(void *self); /* the initial state at t = 0 */
   int (*advance)(void *self, const hxInput *input, double t_end);
   void (*torso)(void *self, double position[3]); /* m  centre of mass */
@@ -41,7 +42,7 @@ static inline double seconds_now(void) {
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-static inline int walk_read(const char *path, Walk *walk) {
+static inline int walk_read(const char *path, Recording *walk) {
   FILE *file = fopen(path, "rb");
   int good = file && fread(&walk->definition, sizeof walk->definition, 1, file) == 1 &&
              fread(&walk->n, sizeof walk->n, 1, file) == 1 &&
@@ -57,7 +58,7 @@ static inline int walk_read(const char *path, Walk *walk) {
 }
 
 /* Runs the walk once; path: (n + 1) x 3. Returns 0, or 1 if the engine failed. */
-static inline int walk_once(const Driver *driver, void *self, const Walk *walk, double *path,
+static inline int walk_once(const Driver *driver, void *self, const Recording *walk, double *path,
                             double *seconds) {
   if (driver->start(self)) return 1;
   const double begin = seconds_now();
@@ -71,7 +72,7 @@ static inline int walk_once(const Driver *driver, void *self, const Walk *walk, 
 }
 
 /* Returns the mean time of an evaluation over a walk's first states [us], negative if unknown. */
-static inline double evaluation_time(const Driver *driver, void *self, const Walk *walk) {
+static inline double evaluation_time(const Driver *driver, void *self, const Recording *walk) {
   double seconds = 0.0;
   if (!driver->evaluate || driver->start(self)) return -1.0;
   const int64_t n = walk->n < STATES ? walk->n : STATES;
@@ -92,7 +93,7 @@ static inline int path_write(const char *name, const double *path, int64_t n) {
   return good ? 0 : 1;
 }
 
-static inline int driver_run(const Driver *driver, void *self, const Walk *walk, int repeats,
+static inline int driver_run(const Driver *driver, void *self, const Recording *walk, int repeats,
                              double *path) {
   double evaluations = 0.0;
   printf("{\"seconds\": [");
@@ -112,7 +113,7 @@ static inline int driver_run(const Driver *driver, void *self, const Walk *walk,
 }
 
 static inline int driver_main(int argc, char **argv, const Driver *driver, void *self) {
-  Walk walk;
+  Recording walk;
   if (argc != 6) {
     fprintf(stderr, "usage: %s WALK METHOD STEP REPEATS PATH_OUT\n", argv[0]);
     return 2;

@@ -45,14 +45,14 @@ static int create(hxPlant **plant, int count, const hxDefinition *definition) {
   return 0;
 }
 
-static int step_all(hxPlant **plant, int count, const Walk *walk, int64_t k) {
+static int step_all(hxPlant **plant, int count, const Recording *walk, int64_t k) {
   for (int i = 0; i < count; ++i)
     if (hx_plant_step(plant[i], &walk->input[k], (double)(k + 1) * walk->h) != HX_OK) return 1;
   return 0;
 }
 
 /* Steps all plants through the walk; returns the time of a step [s], < 0 on failure. */
-static double step_time(hxPlant **plant, int count, const Walk *walk) {
+static double step_time(hxPlant **plant, int count, const Recording *walk) {
   const double begin = seconds_now();
   for (int64_t k = 0; k < walk->n; ++k)
     if (step_all(plant, count, walk, k)) return -1.0;
@@ -69,7 +69,7 @@ static int share_work(hxPlant **plant, int count, const hxDefinition *definition
 }
 
 int main(int argc, char **argv) {
-  Walk walk;
+  Recording walk;
   if (argc != 4) {
     fprintf(stderr, "usage: %s WALK TOLERANCE COUNT\n", argv[0]);
     return 2;

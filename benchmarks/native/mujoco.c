@@ -171,7 +171,7 @@ static void apply_law(const mjModel *m, mjData *d) {
 
 /* ---- driver ---- */
 
-static int prepare(void *self, const Walk *walk, const char *method, double step) {
+static int prepare(void *self, const Recording *walk, const char *method, double step) {
   static Xml xml;
   MuJoCo *mujoco = self;
   const char *integrator = method + 4;

@@ -191,7 +191,7 @@ void semi_implicit_step(Engine &engine, const hxInput &input, double h) {
   engine.state = moved(engine.state, h, position_rate(engine.state.q, after), a);
 }
 
-int prepare(void *self, const Walk *walk, const char *method, double step) {
+int prepare(void *self, const Recording *walk, const char *method, double step) {
   Engine &engine = *static_cast<Engine *>(self);
   engine.rk4 = std::strcmp(method, "rk4") == 0;
   if (!engine.rk4 && std::strcmp(method, "semi-implicit") != 0) {

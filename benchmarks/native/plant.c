@@ -22,7 +22,7 @@ static const struct {
     {"dp54", HX_METHOD_DP54, 0},   {"dp54-fixed", HX_METHOD_DP54, 1},
 };
 
-static int prepare(void *self, const Walk *walk, const char *method, double step) {
+static int prepare(void *self, const Recording *walk, const char *method, double step) {
   Ours *ours = self;
   ours->definition = walk->definition;
   for (size_t i = 0; i < sizeof methods / sizeof methods[0]; ++i) {

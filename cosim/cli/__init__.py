@@ -85,7 +85,7 @@ def _usage(error: Any, given: Sequence[str]) -> int:
     """Reports words that are no command, or shows the help. Returns the exit code."""
     from hexapod_cosim.models import HexapodError
 
-    if not given:
+    if error.format_message().startswith("Usage:"):  # of a command without a sub-command
         print(error.format_message(), file=sys.stderr)
         return USAGE
     got, expected, fix = usage_parts(error)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,18 +15,12 @@ from hexapod_cosim.cosim.cli.running import (
     check_accuracy,
     chosen_controls,
     default_folder,
+    run_all,
     run_into,
     show_rows,
     titled,
 )
-from hexapod_cosim.cosim.cli.terminal import (
-    counting_bar,
-    show_files,
-    show_json,
-    show_text,
-    waiting,
-    warn,
-)
+from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_text, waiting, warn
 from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.report.figures import draw_figures
@@ -51,8 +44,7 @@ from hexapod_cosim.cosim.results.side_by_side import (
     write_comparison,
     write_seeds,
 )
-from hexapod_cosim.cosim.results.summary import Summary, summarise
-from hexapod_cosim.cosim.run.batch import run_batch
+from hexapod_cosim.cosim.results.summary import summarise
 from hexapod_cosim.cosim.run.gait_selection import select_gait
 from hexapod_cosim.cosim.run.plan import chosen_gains
 from hexapod_cosim.cosim.run.plant import PlantFmus
@@ -258,20 +250,14 @@ def _first_seed(work: Work, folder: ResultsFolder) -> tuple[dict[str, Result], l
 
 def _all_seeds(work: Work, results: Mapping[str, Result], folder: Path) -> Comparisons:
     """Runs the other seeds and compares all runs."""
-    plan, options, count = work.plan, work.options, len(work.compared)
+    plan = work.plan
     scenarios = [
         replace(plan, control=control.text, seed=seed)
         for seed in range(plan.seed, plan.seed + work.seeds)
         for control in (work.compared if seed > plan.seed else work.chosen)
     ]
-    done: list[Summary] = [summarise(results[label]) for label in work.labels]
-    compiled = options.engine == "compiled"
-    batch = run_batch(scenarios, fmu=options.fmu, gains=options.gains, compiled=compiled)
-    with counting_bar("seeds", count * work.seeds) as report_count, closing(batch) as runs:
-        report_count(len(done))
-        for run in runs:
-            done.append(run)
-            report_count(len(done))
+    first = [summarise(results[label]) for label in work.labels]
+    done = run_all("seeds", scenarios, work.options, first)
     write_seeds(folder / SEEDS, done)
     of_controls = {
         one.label: [run for run in done if run.control == one.label] for one in work.compared

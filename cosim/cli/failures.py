@@ -81,6 +81,8 @@ def usage_parts(error: Any) -> tuple[str, str, str]:
     error: the exception of the parser; its `ctx` is None for an option without its value.
     """
     context, message = error.ctx, " ".join(error.format_message().rstrip(".").split())
+    for refused in getattr(error.__cause__, "errors", list)():  # a value that typer does not name
+        message = message.replace("Invalid value", f"Invalid value {refused['input']!r}", 1)
     if not context:
         return message, "a value after it", "`hexapod --help` explains it"
     path, fix = context.command_path, f"`{context.command_path} --help` explains it"

@@ -55,8 +55,8 @@ def gaits() -> Rows:
 def terrains() -> Rows:
     """Returns the kinds of ground with the defaults of their parameters."""
     from hexapod_cosim.models.ground.parameters import DIFFICULTY
+    from hexapod_cosim.models.ground.surface import PLANES
     from hexapod_cosim.models.ground.table import CATALOGUE, PLACED
-    from hexapod_cosim.models.records import PLANES
 
     units = {"height": "m", "incline": "rad", "heading": "rad"}
     rows = [row for row in _choices("TerrainKind") if row["name"] in PLANES]

@@ -178,6 +178,20 @@ def chosen_controls(texts: Sequence[str], plan: Scenario) -> tuple[Control, ...]
     return controls
 
 
+def run_all(
+    label: str, plans: Sequence[Scenario], options: RunOptions, done: Sequence[Summary] = ()
+) -> list[Summary]:
+    """Runs scenarios, shows how many have run; returns `done` and the summaries of the others."""
+    compiled, found = options.engine == "compiled", list(done)
+    batch = run_batch(plans, fmu=options.fmu, gains=options.gains, compiled=compiled)
+    with counting_bar(label, len(done) + len(plans)) as report_count, closing(batch) as runs:
+        report_count(len(found))
+        for summary in runs:
+            found.append(summary)
+            report_count(len(found))
+    return found
+
+
 def check_accuracy(
     plans: Sequence[Scenario], runs: Sequence[Summary], options: RunOptions
 ) -> Accuracy:
@@ -189,14 +203,7 @@ def check_accuracy(
         options: those of the runs.
     """
     fine = [reference_scenario(plan) for plan in plans]
-    compiled = options.engine == "compiled"
-    batch = run_batch(fine, fmu=options.fmu, gains=options.gains, compiled=compiled)
-    references: list[Summary] = []
-    with counting_bar("accuracy", len(fine)) as report_count, closing(batch) as done:
-        for summary in done:
-            references.append(summary)
-            report_count(len(references))
-    found = compare_accuracy(plans[0], runs, references)
+    found = compare_accuracy(plans[0], runs, run_all("accuracy", fine, options))
     for text in found.notes:
         warn(f"accuracy: {text}")
     return found

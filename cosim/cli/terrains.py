@@ -11,9 +11,8 @@ from hexapod_cosim.cosim.common.files import named
 from hexapod_cosim.cosim.scenario.tables import parse_value
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
 from hexapod_cosim.models.ground.parameters import DIFFICULTY, Parameter
-from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.surface import PLANES, Surface
 from hexapod_cosim.models.ground.table import CATALOGUE, read_terrain
-from hexapod_cosim.models.records import PLANES
 
 PICTURES = (".png", ".svg")
 PREFIX = "terrain."

@@ -37,7 +37,7 @@ from hexapod_cosim.cosim.master.connection import (
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_block import FmuBlock
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError
-from hexapod_cosim.models.records import Vector3
+from hexapod_cosim.models.arrays import Vector3
 
 LEGS, JOINTS = len(LEG_NAMES), len(JOINT_NAMES)
 REFERENCES = 4  # angle, speed, torque, acceleration

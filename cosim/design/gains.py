@@ -20,7 +20,7 @@ from hexapod_cosim.cosim.design.standing import StanceError, rest
 from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.models import LEG_NAMES, Robot, unknown_name
-from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.schema import specs
 
 STANCES: Mapping[str, Sequence[str]] = {

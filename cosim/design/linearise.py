@@ -33,8 +33,8 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.sensors import MEASURED
 from hexapod_cosim.cosim.master.signals import COMMANDED, PUSH
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.kinematics import quaternion_product
-from hexapod_cosim.models.records import Array
 
 ANGLES = LEGS * JOINTS
 POSES = 6 + ANGLES  # of torso and joints; the states are these and their velocities

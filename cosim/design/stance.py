@@ -12,7 +12,7 @@ gravity sideways requires.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from hexapod_cosim.controller import (
     LegSolver,
     Measurement,
     Parts,
-    make_gait,
 )
 from hexapod_cosim.controller.comply.planned_squeeze import PlannedSqueeze
 from hexapod_cosim.controller.comply.support import Support
@@ -34,7 +33,7 @@ from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics, Neighbours
 from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.models import ReachError, Robot
-from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.arrays import Array
 
 PHASES = 24  # moments of a gait cycle at which loads are computed
 STEPS = 60  # periods of the cycle whose joint angles and speeds are checked
@@ -59,25 +58,20 @@ class Walked:
     lifts: bool  # the joints can lift each foot by half the step height, anywhere on its way
 
 
-@dataclass(frozen=True)
-class StanceDesign:
-    """The stance of least heat."""
+class StanceChange(NamedTuple):
+    """By how much a robot's feet are moved from its own stance."""
 
-    robot: Robot  # with the stance
-    outward: float  # m    by which the feet stand further out from the hips
-    deeper: float  # m    by which the torso stands higher
-    before: Walked
-    after: Walked
+    outward: float  # m    further out from the hips
+    deeper: float  # m    below them
 
 
-def find_stance(robot: Robot, *, gait: Gait | None = None) -> StanceDesign:
+def find_stance(robot: Robot, gait: Gait) -> StanceChange:
     """Finds the stance of least heat near the robot's own, by a search in two lengths.
 
     The search tries the eight neighbours at the present step size, moves to the best allowed one,
     and halves the size when there is none. Raises GainsError for a robot whose own stance does not
     reach the steps of its gait.
     """
-    gait = make_gait(robot) if gait is None else gait
     before = walked(robot, gait)
     if not np.isfinite(before.speed):
         raise GainsError(
@@ -88,24 +82,24 @@ def find_stance(robot: Robot, *, gait: Gait | None = None) -> StanceDesign:
             where=robot.name,
         )
     unit = _depth(robot)
-    place, best, size = (0.0, 0.0), (robot, before), FIRST_STEP
+    best, heat, size = StanceChange(0.0, 0.0), before.heat, FIRST_STEP
     while size >= LAST_STEP:
-        found = _best_neighbour(robot, gait, place, size * unit, before, best[1].heat)
+        found = _best_neighbour(robot, gait, best, size * unit, before, heat)
         if found is None:
             size *= 0.5
         else:
-            place, best = found
-    return StanceDesign(best[0], *place, before, best[1])
+            best, heat = found
+    return best
 
 
 def _best_neighbour(
-    robot: Robot, gait: Gait, place: tuple[float, float], size: float, before: Walked, heat: float
-) -> tuple[tuple[float, float], tuple[Robot, Walked]] | None:
-    """Returns the allowed neighbour of least heat below `heat`, with its robot and loads."""
+    robot: Robot, gait: Gait, place: StanceChange, size: float, before: Walked, heat: float
+) -> tuple[StanceChange, float] | None:
+    """Returns the allowed neighbour of least heat below `heat`, with its heat."""
     found = None
     for out, down in ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)):
-        there = (place[0] + out * size, place[1] + down * size)
-        if abs(there[1]) > HIGHER * _depth(robot):
+        there = StanceChange(place.outward + out * size, place.deeper + down * size)
+        if abs(there.deeper) > HIGHER * _depth(robot):
             continue
         try:
             moved = with_stance(robot, *there)
@@ -116,7 +110,7 @@ def _best_neighbour(
             continue
         loads = walked(moved, gait)
         if _allowed(moved, gait, loads, before):
-            found, heat = (there, (moved, loads)), loads.heat
+            found, heat = (there, loads.heat), loads.heat
     return found
 
 

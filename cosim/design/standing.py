@@ -19,9 +19,9 @@ from hexapod_cosim.cosim.interface.names import JOINTS, LEGS
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.signals import PUSH
 from hexapod_cosim.models import LEG_NAMES, FmuError, ReachError, Robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.dynamics import masses
 from hexapod_cosim.models.kinematics import body_states
-from hexapod_cosim.models.records import Array
 
 # lengths, times and speeds here are for robots of the usual size (size.py)
 LIFT = 0.04  # m    of the feet that do not stand

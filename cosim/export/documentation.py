@@ -20,8 +20,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from PIL import Image, ImageDraw
 
 from hexapod_cosim.cosim.interface.records import Interface
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.kinematics import body_states, rotation_matrix
-from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.statics import settled
 
 AZIMUTH, ELEVATION = math.radians(-52.0), math.radians(27.0)  # of the eye

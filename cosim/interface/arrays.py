@@ -16,7 +16,6 @@ from itertools import islice
 
 from hexapod_cosim.cosim.interface.patterns import plain_name
 from hexapod_cosim.cosim.interface.records import CAUSALITIES, Interface, Pattern, Variable
-from hexapod_cosim.models.errors import HexapodError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,10 +40,7 @@ class Array:
 
 
 def arrays(interface: Interface) -> tuple[Array, ...]:
-    """Returns all variables in the order of interface.toml.
-
-    Raises HexapodError when two patterns have one name.
-    """
+    """Returns all variables in the order of interface.toml."""
     found: list[Array] = []
     for causality in CAUSALITIES:
         variables = iter(interface.of_causality(causality))
@@ -53,14 +49,6 @@ def arrays(interface: Interface) -> tuple[Array, ...]:
             for pattern in interface.patterns
             if pattern.causality == causality
         ]
-    names = [array.name for array in found]
-    if twice := {name for name in names if names.count(name) > 1}:
-        raise HexapodError(
-            "names of FMI 3 variables",
-            got=f"twice {', '.join(sorted(twice))}",
-            expected="each once",
-            fix="rename a pattern",
-        )
     return tuple(found)
 
 

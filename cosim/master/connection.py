@@ -24,8 +24,7 @@ from hexapod_cosim.cosim.master.fmu_block import FmuVariable
 from hexapod_cosim.cosim.master.sensors import CONTACT, MEASURED, READINGS
 from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, COMMANDS, JOINT_COMMANDS
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError, nearest_name
-from hexapod_cosim.models.files import read_text
-from hexapod_cosim.models.schema import decoding_toml, parse_toml
+from hexapod_cosim.models.files import decoding_toml, parse_toml, read_text
 
 MOST_SHOWN = 12  # names in a message
 # sources of inputs, in the order of the vector that source_vector() fills

@@ -43,16 +43,14 @@ class Fmu(Closing):
         self.path = Path(path)
         self.description = read_description(self.path)
         self.variables = {variable.name: variable for variable in self.description.modelVariables}
-        self._logged = FmuLog()
-        self._log = self._logged.messages
-        self.clear_log = self._log.clear  # called before each call: errors quote new messages only
+        self.log = FmuLog(self.path.name)
         self._directory = TemporaryFolder("fmu")
         self._slave: Any = None
         self._initialised = False
         try:
             self._instantiate(name)
         except Exception as error:
-            message = self._log[-1] if self._log else str(error)
+            message = self.log.last(str(error))
             self.close()
             if isinstance(error, FmuError):
                 raise
@@ -76,7 +74,7 @@ class Fmu(Closing):
         with chdir(Path.cwd()):  # fmpy does not restore the folder when the library fails to load
             slave = FMU2Slave(instanceName=name, libraryPath=library, **facts)
         try:
-            slave.instantiate(callbacks=self._logged.callbacks, loggingOn=True)
+            slave.instantiate(callbacks=self.log.callbacks, loggingOn=True)
         except Exception:
             slave.freeLibrary()
             raise
@@ -125,14 +123,6 @@ class Fmu(Closing):
         unchecked = ctypes.cast(function, ctypes.CFUNCTYPE(function.restype))
         return partial(unchecked, ctypes.c_void_p(self._slave.component), *arguments)
 
-    def failure(self, what: str, status: int) -> FmuError:
-        """Returns the error for a call that returned `status`, with the FMU's last message."""
-        return FmuError(what, got=self._last_message(status), where=self.path.name)
-
-    def _last_message(self, status: int) -> str:
-        """Returns the FMU's last message, or the status where it gave none."""
-        return self._log[-1] if self._log else f"status {STATUS[status]} without a message"
-
     def names(self, causality: str, kind: str = "Real") -> list[str]:
         """Names of all variables of a causality and FMI type, in model description order."""
         return [
@@ -159,7 +149,7 @@ class Fmu(Closing):
             raise FmuError(
                 "a block holds variables of one type", got=sorted(kinds), where=str(self.path)
             )
-        return FmuBlock(self, names, kinds.pop(), references, buffer)
+        return FmuBlock(self.bind, self.log, names, kinds.pop(), references, buffer)
 
     def parameters(self) -> dict[str, float]:
         """Returns the present values of all parameters; enumerations as the number of the item."""
@@ -209,8 +199,8 @@ class Fmu(Closing):
             block = self.block([name])
             block.values[0] = value
             status = block.try_set()
-            if status > WARNING and self._log:  # the message has name, value and range
-                raise FmuError(self._last_message(status), where=self.path.name)
+            if status > WARNING and self.log.messages:  # the message has name, value and range
+                raise FmuError(self.log.last_of(status), where=self.path.name)
             if status > WARNING:
                 raise FmuError(
                     f"{name}: the FMU refuses the value", got=value, where=self.path.name
@@ -253,26 +243,26 @@ class Fmu(Closing):
 
     def _call_to_initialise(self, call: Callable[[], Any]) -> None:
         """Calls a function of fmpy. Raises FmuError with the FMU's last message."""
-        self.clear_log()
+        self.log.clear()
         try:
             call()
         except Exception as error:
-            message = self._log[-1] if self._log else str(error)
+            got = self.log.last(str(error))
             raise FmuError(
-                "the FMU cannot be initialised", got=message, where=str(self.path)
+                "the FMU cannot be initialised", got=got, where=str(self.path)
             ) from error
 
     def reset(self) -> None:
         """Resets the instance to its start values, not initialised. Raises FmuError."""
-        self.clear_log()
+        self.log.clear()
         status = self._reset()
         if status > WARNING:
-            raise self.failure("the FMU cannot be reset", status)
+            raise self.log.failure("the FMU cannot be reset", status)
         self._initialised = False
 
     def step(self, t: float, h: float) -> None:
         """Steps from t to t + h [s]. Raises StepError."""
-        self.clear_log()
+        self.log.clear()
         self._begin.value, self._length.value = t, h
         status = self._do_step()
         if status > WARNING:
@@ -280,7 +270,7 @@ class Fmu(Closing):
 
     def step_failure(self, t: float, status: int) -> StepError:
         """Returns the error for a step from t [s] that returned `status`."""
-        message, reached = self._last_message(status), math.nan
+        message, reached = self.log.last_of(status), math.nan
         if STATUS[status] == "discard":
             with suppress(Exception):  # fmpy's own error type: the FMU does not report the time
                 reached = float(self._slave.getRealStatus(LAST_SUCCESSFUL_TIME))
@@ -301,4 +291,4 @@ class Fmu(Closing):
             slave.fmiCallLogger = None
             slave.freeInstance()
         self._directory.close()
-        self._logged.close()
+        self.log.close()

@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
@@ -18,9 +18,6 @@ from fmpy.logging import addLoggerProxy
 from numpy.typing import NDArray
 
 from hexapod_cosim.models.errors import FmuError, unknown_name
-
-if TYPE_CHECKING:
-    from hexapod_cosim.cosim.master.fmu import Fmu
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 WARNING = STATUS.index("warning")
@@ -63,13 +60,15 @@ class FmuBlock:
 
     The arguments of the C calls are converted once, here, so that a call allocates nothing.
 
-    `buffer`: a contiguous array for the values, float64 for Reals and int32 for all other types;
-    without one, the block allocates its own.
+    `bind` returns the call of a C function with fixed arguments. `buffer`: a contiguous array for
+    the values, float64 for Reals and int32 for all other types; without one, the block allocates
+    its own.
     """
 
     def __init__(
         self,
-        fmu: Fmu,
+        bind: Callable[..., Callable[[], int]],
+        log: FmuLog,
         names: Sequence[str],
         kind: str,
         references: Sequence[int],
@@ -80,11 +79,11 @@ class FmuBlock:
         assert (values.dtype, values.shape) == (dtype, (len(names),)), "not a buffer of these"
         assert values.flags.c_contiguous, "not a contiguous buffer"
         self.names, self.values = tuple(names), values
-        self._fmu = fmu
+        self._log = log
         numbers = (ctypes.c_uint * len(names))(*references)
         size, address = ctypes.c_size_t(len(names)), ctypes.c_void_p(values.ctypes.data)
-        self._get = fmu.bind(f"fmi2Get{SUFFIX[kind]}", numbers, size, address)
-        self._set = fmu.bind(f"fmi2Set{SUFFIX[kind]}", numbers, size, address)
+        self._get = bind(f"fmi2Get{SUFFIX[kind]}", numbers, size, address)
+        self._set = bind(f"fmi2Set{SUFFIX[kind]}", numbers, size, address)
 
     def get(self) -> None:
         """Reads all values from the FMU. Raises FmuError."""
@@ -92,7 +91,7 @@ class FmuBlock:
 
     def try_set(self) -> int:
         """Writes all values to the FMU and returns the FMI status."""
-        self._fmu.clear_log()
+        self._log.clear()
         return self._set()
 
     def set(self) -> None:
@@ -100,10 +99,10 @@ class FmuBlock:
         self._call(self._set, "the FMU does not take its inputs")
 
     def _call(self, call: Callable[[], int], what: str) -> None:
-        self._fmu.clear_log()
+        self._log.clear()
         status = call()
         if status > WARNING:
-            raise self._fmu.failure(what, status)
+            raise self._log.failure(what, status)
 
 
 def parameter_number(variable: Any, value: Any) -> float:
@@ -129,11 +128,13 @@ def parameter_number(variable: Any, value: Any) -> float:
 class FmuLog:
     """Warnings and errors of one instance, the newest last.
 
-    `callbacks` is the structure to instantiate the FMU with.
+    `file` is the FMU's, for errors; `callbacks` the structure to instantiate the FMU with. Every
+    call of the FMU clears the log first, so that errors quote new messages only.
     """
 
-    def __init__(self) -> None:
-        self.messages: deque[str] = deque(maxlen=MAX_MESSAGES)
+    def __init__(self, file: str) -> None:
+        self.file, self.messages = file, deque[str](maxlen=MAX_MESSAGES)
+        self.clear = self.messages.clear
         self._environment = next(_environments)
         _logs[self._environment] = self.messages
         self.callbacks = fmi2CallbackFunctions()
@@ -142,6 +143,18 @@ class FmuLog:
         self.callbacks.freeMemory = defaultCallbacks.freeMemory
         self.callbacks.componentEnvironment = self._environment
         addLoggerProxy(ctypes.byref(self.callbacks))  # formats the variadic message in C
+
+    def last(self, otherwise: str) -> str:
+        """Returns the last message, or other text where there is none."""
+        return self.messages[-1] if self.messages else otherwise
+
+    def last_of(self, status: int) -> str:
+        """Returns the last message for a call that returned `status`."""
+        return self.last(f"status {STATUS[status]} without a message")
+
+    def failure(self, what: str, status: int) -> FmuError:
+        """Returns the error for a call that returned `status`, with the last message."""
+        return FmuError(what, got=self.last_of(status), where=self.file)
 
     def close(self) -> None:
         """Stops collecting messages; may be called twice."""

@@ -180,7 +180,7 @@ class NativeMaster:
         self._master.stepper.h = h
         arrays = self._point_to_run(schedule, errors or Errors())
         for fmu in self._fmus.values():
-            fmu.clear_log()
+            fmu.log.clear()
         begin = perf_counter()
         status, reason, cause = self._run_steps(schedule.times, h, rows, progress)
         wall = perf_counter() - begin
@@ -278,7 +278,9 @@ class NativeMaster:
         stepper = self._master.stepper
         which, what = CALLS[stepper.call - 1]
         fmu = self._fmus[which]
-        return fmu.failure(what, stepper.status) if what else fmu.step_failure(t, stepper.status)
+        return (
+            fmu.log.failure(what, stepper.status) if what else fmu.step_failure(t, stepper.status)
+        )
 
 
 def _ours(pairs: Pairs) -> list[str]:

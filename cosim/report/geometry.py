@@ -19,11 +19,11 @@ from hexapod_cosim.cosim.report.columns import pack
 from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.support import FLAT, SLOPE
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot
+from hexapod_cosim.models.files import parse_toml
 from hexapod_cosim.models.ground.faces import surface_heights
 from hexapod_cosim.models.ground.patches import PROPERTIES
 from hexapod_cosim.models.ground.smooth import RUN_OUT
 from hexapod_cosim.models.ground.surface import LAW, MU, Surface
-from hexapod_cosim.models.schema import parse_toml
 
 Parameters = Mapping[str, float]
 Array = NDArray[np.float64]

@@ -117,7 +117,7 @@ def creep_note(facts: RunFacts, surface: Surface | None = None) -> str:
     surface: the run's.
     """
     parameters = facts.parameters
-    creeps = friction_law(parameters).creeps
+    creeps = friction_law(parameters).creep is not None
     return CREEP if creeps and not _has_soil(parameters, surface) else ""
 
 

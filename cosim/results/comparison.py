@@ -169,15 +169,14 @@ def change_of(name: str, pairs: Sequence[tuple[float, float]] | Array) -> Change
     n = len(values)
     samples = np.column_stack([values, values[:, 1] - values[:, 0]])
     mean = samples.mean(axis=0) if n else np.full(3, math.nan)
-    square = np.sum((samples - mean) ** 2, axis=0)
-    width = half_widths(np.array(n), square[2])
-    log_width = log_half_widths(np.array(n), mean[0], mean[1], square)
+    squares = np.sum((samples - mean) ** 2, axis=0).tolist()
+    before, after, _ = mean.tolist()
     return made_change(
         name,
-        before=float(mean[0]),
-        after=float(mean[1]),
-        half_width=float(width),
-        log_half_width=float(log_width),
+        before=before,
+        after=after,
+        half_width=_half_width(n, squares[2]),
+        log_half_width=_log_half_width(n, before, after, squares),
         pairs=n,
     )
 
@@ -189,7 +188,6 @@ def made_change(
 
     Means are NaN when there is no pair.
     """
-    verdict = str(verdicts(name, *map(np.array, (before, after, half_width, log_half_width))))
     return Change(
         before=before,
         after=after,
@@ -197,69 +195,55 @@ def made_change(
         log_half_width=log_half_width,
         pairs=pairs,
         floor=FLOORS[name],
-        verdict=verdict,
+        verdict=_verdict(name, before, after, half_width, log_half_width),
     )
 
 
-def half_width_of(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+def half_width_of(values: Array) -> float:
     """Returns half the width of the mean's confidence interval; NaN for fewer than two values."""
-    n = len(values)
-    if n < 2:
+    square = float(np.sum((values - values.mean()) ** 2)) if len(values) else 0.0
+    return _half_width(len(values), square)
+
+
+def _half_width(count: int, square: float) -> float:
+    """Returns half the width of Student's interval of a mean; NaN for fewer than two values.
+
+    square: sum of squared deviations from the mean.
+    """
+    from scipy.special import stdtrit  # noqa: PLC0415  slow to import
+
+    if count < 2:
         return math.nan
-    return float(half_widths(np.array(n), np.array(np.sum((values - values.mean()) ** 2))))
+    quantile = float(stdtrit(count - 1.0, 0.5 + 0.5 * CONFIDENCE))
+    return quantile * math.sqrt(square / (count * (count - 1.0)))
 
 
-def half_widths(count: Array, square: Array) -> Array:
-    """Returns half the widths of Student's intervals of means; NaN for fewer than two values.
+def _log_half_width(count: int, before: float, after: float, squares: Sequence[float]) -> float:
+    """Returns half the width of the interval of ln(after/before); NaN unless both means are > 0.
 
-    Args:
-        count: numbers of values.
-        square: sums of squared deviations from the mean.
+    squares: sums of squared deviations from the mean: of the first values, the second values and
+    the differences.
     """
-    from scipy.special import stdtrit  # noqa: PLC0415  slow to import
-
-    free = np.where(count > 1, count - 1.0, math.nan)
-    return np.asarray(
-        stdtrit(free, 0.5 + 0.5 * CONFIDENCE) * np.sqrt(square / (free * (free + 1.0)))
-    )
-
-
-def log_half_widths(
-    count: Array, before: Array, after: Array, squares: Sequence[Array] | Array
-) -> Array:
-    """Returns half the widths of the intervals of ln(after/before); NaN unless both means are > 0.
-
-    Args:
-        count: numbers of pairs.
-        before, after: means of the first and of the second values.
-        squares: sums of squared deviations from the mean: of the first values, the second values
-            and the differences.
-    """
-    from scipy.special import stdtrit  # noqa: PLC0415  slow to import
-
-    known = (np.asarray(before) > 0.0) & (np.asarray(after) > 0.0)
-    free = np.where(known & (count > 1), count - 1.0, math.nan)
-    a, b = np.where(known, before, 1.0), np.where(known, after, 1.0)
+    if not min(before, after) > 0.0:
+        return math.nan
     first, second, apart = squares
     # the equation of the module's docstring, rearranged to avoid cancellation
-    square = (1.0 / a - 1.0 / b) * (first / a - second / b) + apart / (a * b)
-    return np.asarray(
-        stdtrit(free, 0.5 + 0.5 * CONFIDENCE)
-        * np.sqrt(np.maximum(square, 0.0) / (free * (free + 1.0)))
-    )
+    square = (1.0 / before - 1.0 / after) * (first / before - second / after)
+    return _half_width(count, max(square + apart / (before * after), 0.0))
 
 
-def verdicts(
-    name: str, before: Array, after: Array, half_width: Array, log_half_width: Array
-) -> np.ndarray[Any, np.dtype[np.str_]]:
+def _verdict(
+    name: str, before: float, after: float, half_width: float, log_half_width: float
+) -> str:
     """Returns BETTER, WORSE, SAME, or "" where neither side is better or there is no mean."""
     less_is_better, difference = METRICS[name][1], after - before
-    ratio = np.isfinite(log_half_width) & (np.abs(before) > FLOORS[name])
-    log_ratio = np.log(np.where(ratio, after / np.where(ratio, before, 1.0), 1.0))
-    change = np.where(ratio, log_ratio, difference)
-    unsure = np.where(np.isnan(half_width), LEAST_CHANGE * np.abs(before), half_width)
-    same = (np.abs(difference) < FLOORS[name]) | (
-        np.abs(change) <= np.where(ratio, log_half_width, unsure)
-    )
-    none = np.isnan(difference) | (less_is_better is None)
-    return np.select([none, same, (difference < 0.0) == less_is_better], ["", SAME, BETTER], WORSE)
+    if less_is_better is None or math.isnan(difference):
+        return ""
+    change, unsure = difference, half_width
+    if math.isfinite(log_half_width) and abs(before) > FLOORS[name]:
+        change, unsure = math.log(after) - math.log(before), log_half_width
+    elif math.isnan(half_width):
+        unsure = LEAST_CHANGE * abs(before)
+    if abs(difference) < FLOORS[name] or abs(change) <= unsure:
+        return SAME
+    return BETTER if (difference < 0.0) == less_is_better else WORSE

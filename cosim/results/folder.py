@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,27 +81,28 @@ def results_folder(
     """
     made = claim_folder(path)
     folder = ResultsFolder(path, parts, own)
-    release = _lock(path)
-    try:
-        yield folder
-    except BaseException as error:
-        facts = read_json(path / RUN_FILE) if folder.begun else {}
-        if facts.get("status") == RUNNING:
-            status, reason = FAILED, str(error)
-            if isinstance(error, KeyboardInterrupt):
-                status, reason = INTERRUPTED, "interrupted"
-            write_json(path / RUN_FILE, {**facts, "status": status, "reason": reason})
-        raise
-    finally:
-        release()
-        for place in () if folder.begun else made:
-            with suppress(OSError):  # no longer empty
-                place.rmdir()
+    with locked(path):
+        try:
+            yield folder
+        except BaseException as error:
+            facts = read_json(path / RUN_FILE) if folder.begun else {}
+            if facts.get("status") == RUNNING:
+                status, reason = FAILED, str(error)
+                if isinstance(error, KeyboardInterrupt):
+                    status, reason = INTERRUPTED, "interrupted"
+                write_json(path / RUN_FILE, {**facts, "status": status, "reason": reason})
+            raise
+        finally:
+            for place in () if folder.begun else made:
+                with suppress(OSError):  # no longer empty
+                    place.rmdir()
 
 
-def _lock(folder: Path) -> Callable[[], object]:
-    """Locks a folder and returns what releases it. Raises HexapodError when another process has
-    it.
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Locks a folder: within the block no other process writes its results into it.
+
+    Raises HexapodError when another process has locked it.
     """
     release = lock_folder(folder)
     if release is None:
@@ -110,7 +111,10 @@ def _lock(folder: Path) -> Callable[[], object]:
             fix="wait for it, or choose another with -o",
             where=str(folder),
         )
-    return release
+    try:
+        yield
+    finally:
+        release()
 
 
 def write_result(result: Result, folder: Path) -> list[Path]:

@@ -14,9 +14,8 @@ from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.support import FLAT, GRID
 from hexapod_cosim.models.ground.faces import ground_height
 from hexapod_cosim.models.ground.grid_file import read_grid, surface_from_bytes, write_grid
-from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.surface import Surface, Terrain
 from hexapod_cosim.models.ground.table import terrain_specs
-from hexapod_cosim.models.records import Terrain
 from hexapod_cosim.models.schema import Number
 
 Array = NDArray[np.float64]

@@ -133,4 +133,4 @@ def shown_metrics(runs: Mapping[str, Mapping[str, float | None]], *, net_slip: b
 
 def has_net_slip(parameters: Mapping[str, float]) -> bool:
     """Returns whether slip_net_per_metre is meaningful: under the tanh law it only inverts it."""
-    return not friction_law(parameters).creeps
+    return friction_law(parameters).creep is None

@@ -16,8 +16,9 @@ from hexapod_cosim.cosim.results.support import ground_normal
 from hexapod_cosim.cosim.results.window import SKIPPED_CYCLES, View, friction_law
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
 from hexapod_cosim.models import LEG_NAMES, Robot
+from hexapod_cosim.models.contact.law import SELF_CONTACTS
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import SELF_CONTACTS, Foot, Servo
+from hexapod_cosim.models.records import Foot, Servo
 from hexapod_cosim.models.soil.law import soil_radius
 from hexapod_cosim.models.statics import sliding
 

@@ -17,12 +17,13 @@ from functools import cache, lru_cache
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 from hexapod_cosim.controller import Gains, GainsError, Gait, load_gains, save_gains
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.common.plant_files import binary, fmi2_platform
+from hexapod_cosim.cosim.design.stance import StanceChange
 from hexapod_cosim.cosim.export.cross_build import user_cache
 from hexapod_cosim.models import HexapodError, Robot
 
@@ -30,13 +31,6 @@ from hexapod_cosim.models import HexapodError, Robot
 PACKAGES = ("hexapod_cosim.controller", "hexapod_cosim.cosim.design", "hexapod_cosim.models")
 MAX_DESIGNS = 64  # sets of gains that a process keeps; the least recently used one goes first
 Design = TypeVar("Design")
-
-
-class StanceChange(NamedTuple):
-    """By how much a robot's feet are moved from its own stance."""
-
-    outward: float  # m    further out from the hips
-    deeper: float  # m    below them
 
 
 @lru_cache(maxsize=MAX_DESIGNS)

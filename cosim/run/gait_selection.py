@@ -28,19 +28,20 @@ from hexapod_cosim.cosim.control.fmu_law import walk_of_fmu
 from hexapod_cosim.cosim.design.stance import (
     SPEED_SHARE,
     Motion,
+    StanceChange,
     find_stance,
     settled_motion,
     with_stance,
 )
 from hexapod_cosim.cosim.export.robot_package import SPEED
 from hexapod_cosim.cosim.results.facts import OF_FMU, OWN_CONTROLLER, GaitChoice
-from hexapod_cosim.cosim.run.designs import StanceChange, kept_stance
+from hexapod_cosim.cosim.run.designs import kept_stance
 from hexapod_cosim.cosim.scenario.controls import FMU, control_of
 from hexapod_cosim.cosim.scenario.reach import reaches
 from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.cosim.scenario.records import CHOSEN, DESIGNED, OWN, Command, Scenario
 from hexapod_cosim.models import ReachError, Robot, ScenarioError, Servo, load_robot
-from hexapod_cosim.models.records import Vector3
+from hexapod_cosim.models.arrays import Vector3
 
 CHOSEN_GAIT = "amble"  # of compliant control
 FOOTING = 0.4  # 1    of the way to the stance of least heat by which feet move to the hips
@@ -252,12 +253,7 @@ def _design(robot: Robot, gait: Gait) -> StanceChange:
     """Returns the stance of least heat of a robot file, designed once and kept in the user's
     cache.
     """
-    return kept_stance(robot, gait, _found)
-
-
-def _found(robot: Robot, gait: Gait) -> StanceChange:
-    design = find_stance(robot, gait=gait)
-    return StanceChange(design.outward, design.deeper)
+    return kept_stance(robot, gait, find_stance)
 
 
 def known_robot(scenario: Scenario) -> Robot:

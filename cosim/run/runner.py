@@ -36,6 +36,7 @@ from hexapod_cosim.cosim.run.plant import (
 )
 from hexapod_cosim.cosim.run.single_run import make_result, simulate, start_controller
 from hexapod_cosim.cosim.scenario.controls import FMU, PYTHON, control_of
+from hexapod_cosim.cosim.scenario.events import SensorFault
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, Robot
 
@@ -44,8 +45,8 @@ MAX_SETTINGS = 64  # robots whose settings are kept
 
 def reads_no_numbers(scenario: Scenario) -> bool:
     """Returns whether a sensor of a scenario reads NaN."""
-    kinds = scenario.faults, scenario.angle_faults, scenario.attitude_faults
-    return any(event.fault == "nan" for events in kinds for event in events)
+    faults = (event for event in scenario.events if isinstance(event, SensorFault))
+    return any(fault.fault == "nan" for fault in faults)
 
 
 class Runner(Closing):

@@ -47,8 +47,8 @@ from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
 from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant, run_surface
 from hexapod_cosim.cosim.scenario.controls import control_of
+from hexapod_cosim.cosim.scenario.events import event_log
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.sections import event_log
 from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.surface import Surface
 
@@ -126,7 +126,7 @@ def _make_recorder(plan: RunPlan, signals: Signals, controller: JointController)
 
 def _events(scenario: Scenario, outcome: Outcome) -> tuple[dict[str, Any], ...]:
     """Returns the events of the scenario and those that the controller found, in order of time."""
-    events = [*event_log(scenario, outcome.simulated), *found_faults(outcome.judged)]
+    events = [*event_log(scenario.events, outcome.simulated), *found_faults(outcome.judged)]
     return tuple(sorted(events, key=lambda event: float(event["time"])))
 
 

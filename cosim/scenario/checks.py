@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from hexapod_cosim.controller import Parts
 from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.cosim.interface.records import Interface
+from hexapod_cosim.cosim.scenario.events import ServoFault, Tuning
 from hexapod_cosim.cosim.scenario.records import (
     MAX_STEPS,
     SETTINGS,
@@ -71,7 +72,7 @@ def check_servo_faults(scenario: Scenario, robot: Robot) -> None:
 
     Raises ScenarioError.
     """
-    faults = scenario.servo_faults
+    faults = scenario.events_of(ServoFault)
     if faults and robot.servo.mode == "kinematic":
         raise ScenarioError(
             "a fault of a servo of a kinematic drive",
@@ -87,7 +88,7 @@ def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
 
     `given` are the names set with --set, for the messages. Raises ScenarioError.
     """
-    if not scenario.parameters and not scenario.tunings:
+    if not scenario.parameters and not scenario.events_of(Tuning):
         return
     interface = load_interface(load_robot(scenario.robot))
     known = [entry.name for entry in interface.of_causality("parameter")]
@@ -122,7 +123,7 @@ def _check_tunings(scenario: Scenario, interface: Interface) -> None:
     """Checks that events give tunable parameters values in range. Raises ScenarioError."""
     tunable = [entry.name for entry in interface.variables if entry.variability == "tunable"]
     fixed = {entry.name for entry in interface.of_causality("parameter")} - set(tunable)
-    for event in scenario.tunings:
+    for event in scenario.events_of(Tuning):
         where = f"{scenario.where}: events"
         if event.parameter in fixed:
             raise ScenarioError(

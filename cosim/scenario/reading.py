@@ -42,11 +42,11 @@ from hexapod_cosim.cosim.scenario.sections import (
     read_setting,
     read_stance,
 )
-from hexapod_cosim.cosim.scenario.tables import read_tables, with_overrides
+from hexapod_cosim.cosim.scenario.tables import read_overrides, read_tables, with_values
 from hexapod_cosim.models import Robot, ScenarioError, load_robot
 from hexapod_cosim.models.ground.faces import ground_normal
+from hexapod_cosim.models.ground.surface import Terrain
 from hexapod_cosim.models.ground.table import merged_terrain
-from hexapod_cosim.models.records import Terrain
 from hexapod_cosim.models.schema import (
     Number,
     expect_table,
@@ -65,9 +65,9 @@ def load_scenario(path_or_name: str | Path, *, overrides: Sequence[str] = ()) ->
 
     Raises ScenarioError.
     """
+    given = read_overrides(overrides)
     table, where = read_tables(path_or_name)
-    given = [text.partition("=")[0].strip() for text in overrides]
-    return scenario_from_table(with_overrides(table, overrides), where=where, given=given)
+    return scenario_from_table(with_values(table, given), where=where, given=given)
 
 
 def scenario_from_table(

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from hexapod_cosim.controller import DEFAULT_PERIOD, Parts
 from hexapod_cosim.cosim.common.installation import has_pyarrow
+from hexapod_cosim.cosim.scenario.events import Event
 from hexapod_cosim.models import (
-    JOINT_NAMES,
-    LEG_NAMES,
     Baumgarte,
     BodyContact,
     Contact,
@@ -22,17 +21,10 @@ from hexapod_cosim.models import (
     Solver,
     Terrain,
 )
-from hexapod_cosim.models.schema import Choice, Flag, Number, Text, Texts, Vector, Whole, specs
+from hexapod_cosim.models.schema import Flag, Number, Text, Texts, Vector, Whole, specs
 
 CONTROLS = ("kinematic", "paper", "compliant")
 COMPARED = ("kinematic", "compliant")  # unless a command or a study names its controls
-FAULTS = ("dead", "stuck", "nan", "late")  # of sensors
-NOISY = "noisy"  # a further one of force sensors
-ANGLE, ATTITUDE = "angle", "attitude"  # sensors inside the robot
-SERVO_FAULTS = ("weak", "limp", "locked")
-WHOLE_LEG = "all"  # joints
-LOST = ("command", "step")
-DELAY = Number("s", at_least=0.0, at_most=1.0)  # of late readings
 FORMATS = ("parquet", "csv", "mcap")  # of recordings
 SETTINGS: dict[str, type[Any]] = {
     "gait": Gait,
@@ -50,6 +42,7 @@ GRAVITY = Number("m/s2", above=0.0)  # along -z; or three numbers, a vector in w
 GRAVITY_VECTOR = Vector("m/s2", 3)
 GRAVITY_NAMES = ("gravity[1]", "gravity[2]", "gravity[3]")  # the FMU's parameters
 ZERO = (0.0, 0.0, 0.0)
+E = TypeVar("E", bound=Event)
 ALL_PARTS = Parts()
 MAX_STEPS = 1_000_000  # a row of the recording is about 3 kB, and all rows are in memory
 
@@ -65,104 +58,6 @@ class Command:
     height: Annotated[float, Number("m")] = 0.0
     roll: Annotated[float, Number("rad")] = 0.0
     pitch: Annotated[float, Number("rad")] = 0.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Push:
-    """A force and torque on the torso, world axes, from `time` [s from the start of the run] on."""
-
-    time: Annotated[float, Number("s", at_least=0.0)]
-    duration: Annotated[float, Number("s", above=0.0)]
-    force: Annotated[tuple[float, ...], Vector("N", 3)] = ZERO
-    torque: Annotated[tuple[float, ...], Vector("N m", 3)] = ZERO
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fault:
-    """A fault of a foot's force sensor from `time` [s from the start of the run].
-
-    A dead sensor reads zero, a stuck one repeats its last reading, and nan is no number. A late one
-    reads what it should have read `delay` earlier, rounded up to whole macro-steps, or else at the
-    start of the run. A noisy one has this noise: a standard deviation, as a share of the force.
-    """
-
-    time: Annotated[float, Number("s", at_least=0.0)]
-    leg: Annotated[str, Choice(LEG_NAMES)]
-    fault: Annotated[str, Choice((*FAULTS, NOISY))]
-    delay: Annotated[float, DELAY] = 0.0
-    noise: Annotated[float, Number("1", at_least=0.0)] = 0.1
-    duration: Annotated[float, Number("s", above=0.0)] = math.inf
-
-
-@dataclass(frozen=True, kw_only=True)
-class AngleFault:
-    """A fault of a joint's sensor, which gives angle and speed, as a `Fault`. The joint itself
-    moves as before.
-    """
-
-    time: Annotated[float, Number("s", at_least=0.0)]
-    leg: Annotated[str, Choice(LEG_NAMES)]
-    joint: Annotated[str, Choice(JOINT_NAMES)]
-    sensor: Annotated[str, Choice((ANGLE,))]
-    fault: Annotated[str, Choice(FAULTS)]
-    delay: Annotated[float, DELAY] = 0.0
-    duration: Annotated[float, Number("s", above=0.0)] = math.inf
-
-
-@dataclass(frozen=True, kw_only=True)
-class AttitudeFault:
-    """A fault of the torso's sensor of attitude and rotation rate, as a `Fault`. A dead one reads
-    the level attitude with yaw 0, at rest.
-    """
-
-    time: Annotated[float, Number("s", at_least=0.0)]
-    sensor: Annotated[str, Choice((ATTITUDE,))]
-    fault: Annotated[str, Choice(FAULTS)]
-    delay: Annotated[float, DELAY] = 0.0
-    duration: Annotated[float, Number("s", above=0.0)] = math.inf
-
-
-@dataclass(frozen=True, kw_only=True)
-class ServoFault:
-    """A fault of a joint's servo from `time` [s from the start of the run].
-
-    A weak servo gives a share of its largest torque, a limp one none; a locked joint stays at the
-    angle that it has when the fault begins (the plant's inputs `weakness` and `lock`).
-    """
-
-    time: Annotated[float, Number("s", at_least=0.0)]
-    leg: Annotated[str, Choice(LEG_NAMES)]
-    joint: Annotated[str, Choice((*JOINT_NAMES, WHOLE_LEG))]
-    fault: Annotated[str, Choice(SERVO_FAULTS)]
-    share: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.5  # of a weak one
-    duration: Annotated[float, Number("s", above=0.0)] = math.inf
-
-
-@dataclass(frozen=True, kw_only=True)
-class Lost:
-    """Lost joint commands or dropped macro-steps from `time` [s from the start of the run].
-
-    Where commands are lost, the controller is called, but the servos keep the last command that
-    arrived. Where a whole macro-step is dropped, the readings do not arrive either: the controller
-    is called with the last ones, because its time goes on. The first macro-step cannot be lost.
-    """
-
-    time: Annotated[float, Number("s", above=0.0)]
-    duration: Annotated[float, Number("s", above=0.0)]
-    lost: Annotated[str, Choice(LOST)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Tuning:
-    """A tunable parameter of the plant FMU that has a new value from `time` [s from the start]."""
-
-    time: Annotated[float, Number("s", at_least=0.0)]
-    parameter: Annotated[str, Text()]
-    value: Annotated[float, Number("")]
-
-
-SensorFault = Fault | AngleFault | AttitudeFault
-Event = Push | SensorFault | ServoFault | Lost | Tuning
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -262,41 +157,9 @@ class Scenario:
         timing = {"name", "period", "duty"} & set(self.settings.get("gait", {}))
         return bool(timing) or self.stance is not None
 
-    @property
-    def pushes(self) -> tuple[Push, ...]:
-        """The events that are pushes."""
-        return tuple(event for event in self.events if isinstance(event, Push))
-
-    @property
-    def faults(self) -> tuple[Fault, ...]:
-        """The events that are faults of force sensors."""
-        return tuple(event for event in self.events if isinstance(event, Fault))
-
-    @property
-    def angle_faults(self) -> tuple[AngleFault, ...]:
-        """The events that are faults of joint sensors."""
-        return tuple(event for event in self.events if isinstance(event, AngleFault))
-
-    @property
-    def attitude_faults(self) -> tuple[AttitudeFault, ...]:
-        """The events that are faults of the attitude sensor."""
-        return tuple(event for event in self.events if isinstance(event, AttitudeFault))
-
-    @property
-    def servo_faults(self) -> tuple[ServoFault, ...]:
-        """The events that are faults of servos."""
-        return tuple(event for event in self.events if isinstance(event, ServoFault))
-
-    @property
-    def tunings(self) -> tuple[Tuning, ...]:
-        """The events that change parameters, in order of time."""
-        found = [event for event in self.events if isinstance(event, Tuning)]
-        return tuple(sorted(found, key=lambda event: event.time))
-
-    @property
-    def lost(self) -> tuple[Lost, ...]:
-        """The events that are lost commands or dropped macro-steps."""
-        return tuple(event for event in self.events if isinstance(event, Lost))
+    def events_of(self, kind: type[E]) -> tuple[E, ...]:
+        """Returns the events of one kind in their order in the file."""
+        return tuple(event for event in self.events if isinstance(event, kind))
 
     def to_table(self) -> dict[str, Any]:
         """Returns the scenario as the tables of an equivalent scenario file."""
@@ -341,9 +204,7 @@ SECTIONS = (
     *SETTINGS,
 )
 KEYS = (*PLAIN_KEYS, "gravity", "events", *SECTIONS)
-
-
-UNUSED_SETTINGS = (("delay", 0.0), ("noise", 0.1), ("share", 0.5))
+UNUSED_SETTINGS = (("delay", 0.0), ("noise", 0.1), ("share", 0.5))  # of faults
 
 
 def _as_table(record: Any) -> dict[str, Any]:

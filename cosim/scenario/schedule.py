@@ -11,20 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand
-from hexapod_cosim.cosim.scenario.records import (
+from hexapod_cosim.cosim.scenario.events import (
     FAULTS,
     NOISY,
     WHOLE_LEG,
     AngleFault,
     AttitudeFault,
-    Command,
     Fault,
     Lost,
     Push,
-    Scenario,
     SensorFault,
     ServoFault,
+    Tuning,
 )
+from hexapod_cosim.cosim.scenario.records import Command, Scenario
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 ROUND_OFF = 5e-10  # s    of the time of a macro-step
@@ -75,28 +75,29 @@ def make_schedule(scenario: Scenario) -> Schedule:
     times = scenario.macro_step * np.arange(scenario.steps + 1, dtype=np.float64)
     begins, h = times[:-1], scenario.macro_step
     rows = command_rows(scenario.commands, begins)
-    pushes = push_rows(scenario.pushes, begins, h) if scenario.pushes else None
-    dropped = lost_rows([event for event in scenario.lost if event.lost == "step"], times)
+    pushes, servo_faults = scenario.events_of(Push), scenario.events_of(ServoFault)
+    lost = scenario.events_of(Lost)
+    dropped = lost_rows([event for event in lost if event.lost == "step"], times)
     force, angle, attitude = (
         fault_rows(faults, times, dropped, sensors)
         for faults, sensors in (
-            (scenario.faults, len(LEG_NAMES)),
-            (scenario.angle_faults, len(LEG_NAMES) * len(JOINT_NAMES)),
-            (scenario.attitude_faults, 1),
+            (scenario.events_of(Fault), len(LEG_NAMES)),
+            (scenario.events_of(AngleFault), len(LEG_NAMES) * len(JOINT_NAMES)),
+            (scenario.events_of(AttitudeFault), 1),
         )
     )
     return Schedule(
         scenario.start + times,
         np.vstack([rows, rows[-1:]]),
-        pushes,
+        push_rows(pushes, begins, h) if pushes else None,
         force,
-        servo_rows(scenario.servo_faults, begins) if scenario.servo_faults else None,
-        lost_rows(scenario.lost, times) if scenario.lost else None,
+        servo_rows(servo_faults, begins) if servo_faults else None,
+        lost_rows(lost, times) if lost else None,
         angle,
         attitude,
         tuple(
             (int(np.searchsorted(begins, event.time - ROUND_OFF)), event.parameter, event.value)
-            for event in scenario.tunings
+            for event in sorted(scenario.events_of(Tuning), key=lambda event: event.time)
         ),
     )
 

@@ -1,19 +1,29 @@
-"""Reads the sections of a scenario that are no plain records, and describes its events.
+"""Reads the sections of a scenario that are no plain records.
 
 Every reader takes the table and its name for messages, and raises RobotError or ScenarioError.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 from hexapod_cosim.controller.gains import SECTIONS
-from hexapod_cosim.cosim.scenario.records import (
+from hexapod_cosim.cosim.scenario.events import (
     ANGLE,
     ATTITUDE,
+    AngleFault,
+    AttitudeFault,
+    Event,
+    Fault,
+    Lost,
+    Push,
+    SensorFault,
+    ServoFault,
+    Tuning,
+)
+from hexapod_cosim.cosim.scenario.records import (
     GRAVITY,
     GRAVITY_VECTOR,
     SETTINGS,
@@ -21,22 +31,11 @@ from hexapod_cosim.cosim.scenario.records import (
     STANCES,
     UNUSED,
     WALK_KEYS,
-    WHOLE_LEG,
-    AngleFault,
-    AttitudeFault,
     Command,
-    Event,
-    Fault,
-    Lost,
-    Push,
-    Scenario,
-    SensorFault,
-    ServoFault,
-    Tuning,
 )
 from hexapod_cosim.models import RobotError, ScenarioError
 from hexapod_cosim.models.ground.table import read_keys
-from hexapod_cosim.models.records import Servo, Soil
+from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.schema import (
     Choice,
     expect_table,
@@ -46,22 +45,10 @@ from hexapod_cosim.models.schema import (
     specs,
 )
 from hexapod_cosim.models.servos.presets import servo_table
-from hexapod_cosim.models.soil.presets import soil_table
+from hexapod_cosim.models.soil.presets import Soil, soil_table
 
 # the parts of a gains file that a controller reads
 GAINS = {part: SECTIONS[part] for part in ("support", "hold", "limits", "paper")}
-SENSOR_TEXTS = {
-    "dead": "reads zero",
-    "stuck": "repeats its last reading",
-    "nan": "reads NaN",
-    "late": "is late by {delay:g} ms",
-    "noisy": "has a noise of {noise:g} %",
-}
-LOST_TEXTS = {
-    "command": "the joint commands are lost, and the last one holds",
-    "step": "macro-steps are dropped: the last readings and joint commands hold",
-}
-SERVO_TEXTS = {"weak": "gives {share:g} of its torque", "limp": "is limp", "locked": "is locked"}
 
 
 @contextmanager
@@ -185,47 +172,3 @@ def _check_delay(event: Event, where: str) -> None:
             fix='add delay = "20 ms"' if late else "delete delay, or write fault = 'late'",
             where=where,
         )
-
-
-def event_log(scenario: Scenario, simulated: float) -> list[dict[str, Any]]:
-    """Returns time [s from the start] and text of the events that began within `simulated` [s], in
-    order of time.
-    """
-    begun = [event for event in scenario.events if event.time < simulated]
-    begun.sort(key=lambda event: event.time)
-    return [{"time": event.time, "text": describe_event(event)} for event in begun]
-
-
-def describe_event(event: Event) -> str:
-    """Returns what happens at an event, and for how long."""
-    match event:
-        case Push():
-            text = f"a push of {_vector(event.force)} N and {_vector(event.torque)} N m"
-        case Fault():
-            text = f"the force sensor of {event.leg} {_reading(event)}"
-        case AngleFault():
-            text = f"the angle sensor of {event.leg}.{event.joint} {_reading(event)}"
-        case AttitudeFault():
-            text = f"the attitude sensor {_reading(event)}"
-        case ServoFault():
-            which = f"servo of {event.leg}.{event.joint}"
-            if event.joint == WHOLE_LEG:
-                which = f"leg {event.leg}"
-            text = f"the {which} {SERVO_TEXTS[event.fault].format(share=event.share)}"
-        case Lost():
-            text = LOST_TEXTS[event.lost]
-        case Tuning():
-            return f"{event.parameter} becomes {event.value:g}"
-    return text if math.isinf(event.duration) else f"{text}, for {event.duration:g} s"
-
-
-def _reading(event: SensorFault) -> str:
-    """Returns what a faulty sensor reads."""
-    if isinstance(event, AttitudeFault) and event.fault == "dead":
-        return "reads level and at rest"
-    noise = 100.0 * event.noise if isinstance(event, Fault) else 0.0
-    return SENSOR_TEXTS[event.fault].format(delay=1000.0 * event.delay, noise=noise)
-
-
-def _vector(values: tuple[float, ...]) -> str:
-    return f"[{', '.join(f'{value:g}' for value in values)}]"

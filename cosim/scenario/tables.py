@@ -14,12 +14,12 @@ from typing import Any
 
 from hexapod_cosim.cosim.scenario import list_scenarios
 from hexapod_cosim.cosim.scenario.controls import LAW, control_beside
-from hexapod_cosim.cosim.scenario.records import KEYS, SECTIONS
+from hexapod_cosim.cosim.scenario.records import KEYS, SECTIONS, SETTINGS
 from hexapod_cosim.models import ScenarioError, unknown_name
 from hexapod_cosim.models.errors import refuse_path
-from hexapod_cosim.models.files import read_text
-from hexapod_cosim.models.ground.table import beside
-from hexapod_cosim.models.schema import parse_toml, reading_toml
+from hexapod_cosim.models.files import parse_toml, read_text, reading_toml
+from hexapod_cosim.models.ground.table import terrain_beside
+from hexapod_cosim.models.schema import specs
 
 POINTED = re.compile(r"[+-]?(?:\d+\.|\.\d+)(?:[eE][+-]?\d+)?")  # .1 or 1.
 
@@ -31,12 +31,18 @@ def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
     """
     refuse_path(path_or_name, "the scenario", ScenarioError)
     path = _scenario_path(path_or_name)
+    if path.suffix == ".fmu":
+        raise ScenarioError(
+            "an FMU is no scenario",
+            got=str(path),
+            expected="a scenario file or the name of one",
+            fix=f"in simulate and compare write --fmu {path}",
+        )
     with reading_toml(
         path, kind="scenario", name="the scenario", names=list_scenarios, error=ScenarioError
     ):
         table = parse_toml(read_text(path))
-    if isinstance(table.get("terrain"), dict):
-        table["terrain"] = beside(table["terrain"], path.parent)
+    table = terrain_beside(table, path.parent)
     refuse_path(str(table.get("robot", "")), "the robot file", ScenarioError)
     if "control" in table:
         table["control"] = control_beside(table["control"], path.parent)
@@ -55,21 +61,26 @@ def _scenario_path(path_or_name: str | Path) -> Path:
     return bundled[str(path_or_name)]
 
 
-def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
-    """Returns a copy of the tables with each "NAME=VALUE" set.
+def read_overrides(overrides: Iterable[str]) -> dict[str, Any]:
+    """Returns the values of texts "NAME=VALUE" by name. Raises ScenarioError.
 
-    NAME is a key of the scenario or else an FMU parameter. Raises ScenarioError.
+    NAME is a key of the scenario or else an FMU parameter.
     """
     values: dict[str, Any] = {}
     for text in overrides:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not name or not value:
-            fix = "write --set gait.period=0.8"
+            fix = f"write --set {name or 'gait.period'}=VALUE, without a space"
             raise ScenarioError(
                 "not a setting", got=text, expected="NAME=VALUE", fix=fix, where="--set"
             )
         values[name] = parse_value(value)
-    return with_values(table, values)
+    return values
+
+
+def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
+    """Returns a copy of the tables with each "NAME=VALUE" set. Raises ScenarioError."""
+    return with_values(table, read_overrides(overrides))
 
 
 def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -118,6 +129,14 @@ def _set(table: dict[str, Any], name: str, value: Any) -> None:
         inner[key] = value
     elif dot or "[" in name:
         table.setdefault("parameters", {})[name] = value
+    elif name in SETTINGS and not isinstance(value, dict) and name != "soil":  # has presets
+        raise ScenarioError(
+            "a section, which has keys",
+            got=f"{name}={value}",
+            expected=f"--set {name}.KEY=VALUE",
+            fix=f"write --set {name}.{next(iter(specs(SETTINGS[name])))}={value}",
+            where="--set",
+        )
     elif name in KEYS:
         table[name] = value
     else:

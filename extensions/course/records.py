@@ -19,8 +19,8 @@ from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.tables import with_overrides, with_values
 from hexapod_cosim.models import HexapodError, unknown_name
+from hexapod_cosim.models.files import merged_tables
 from hexapod_cosim.models.ground.table import CATALOGUE
-from hexapod_cosim.models.schema import merged_tables
 
 FOLDER = Path(__file__).parent / "cases"
 COMMON = "course.toml"  # holds version, seeds and what all cases share

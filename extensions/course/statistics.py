@@ -50,22 +50,17 @@ class Rate:
     @property
     def interval(self) -> Interval:
         """The share of successes with Wilson's interval; NaN without runs."""
-        return wilson(self.successes, self.runs)
+        from scipy.stats import binomtest  # noqa: PLC0415  slow to import
+
+        if not self.runs:
+            return Interval(math.nan)
+        found = binomtest(self.successes, self.runs).proportion_ci(CONFIDENCE, method="wilson")
+        return Interval(self.successes / self.runs, float(found.low), float(found.high))
 
     def as_table(self) -> dict[str, Any]:
         """Returns a table for JSON."""
         counts = {"successes": self.successes, "runs": self.runs}
         return {**counts, **self.interval.as_table()}
-
-
-def wilson(successes: int, runs: int) -> Interval:
-    """Returns the share of successes with Wilson's interval."""
-    from scipy.stats import binomtest  # noqa: PLC0415  slow to import
-
-    if not runs:
-        return Interval(math.nan)
-    found = binomtest(successes, runs).proportion_ci(CONFIDENCE, method="wilson")
-    return Interval(successes / runs, float(found.low), float(found.high))
 
 
 def median_ratio(samples: Sequence[Array]) -> Interval:

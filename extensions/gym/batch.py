@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -76,16 +75,6 @@ def surfaces(robots: Sequence[Robot]) -> list[Surface]:
     return list(dict.fromkeys(one for one in given if one is not None))
 
 
-def start_height(robots: Sequence[Robot]) -> float:
-    """Returns the height [m] of the torso at which no foot is deep in any of the grounds."""
-    return max(float(settled(robot)[0][2]) for robot in robots)
-
-
-def export_plant(robots: Sequence[Robot], folder: Path) -> Path:
-    """Exports the plant's FMU with all grounds. Raises HexapodError."""
-    return export_fmu(robots[0], folder / "plant.fmu", terrains=surfaces(robots), bare=True)
-
-
 class Batch(Closing):
     """A number of environments with the same settings; a context manager that frees them.
 
@@ -130,7 +119,9 @@ class Batch(Closing):
         robots = grounds(self.settings)
         self.robot = robots[0]
         with TemporaryFolder("gym") as folder:
-            plant = self._owned.plant = Fmu(export_plant(robots, folder))
+            given = surfaces(robots)
+            path = export_fmu(robots[0], folder / "plant.fmu", terrains=given, bare=True)
+            plant = self._owned.plant = Fmu(path)
         self._allocate()
         native = self._native_settings(robots, plant)
         arrays = NativeArrays(**{name: getattr(self, name).ctypes.data for name in ARRAYS})
@@ -213,7 +204,8 @@ class Batch(Closing):
         }
         count = len(surfaces(robots))
         if count > 1:
-            height = start_height(robots)
+            # m    of the torso, so that no foot is deep in any of the grounds
+            height = max(float(settled(robot)[0][2]) for robot in robots)
             drawn |= {"initial.position[3]": (height, height, False)}
             drawn |= {GROUND: (1.0, float(count), True)}
         self.drawn_names = tuple(drawn)

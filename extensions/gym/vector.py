@@ -23,11 +23,6 @@ from hexapod_cosim.extensions.gym.environment import (
 from hexapod_cosim.extensions.gym.settings import JOINTS, RATE, REASONS, TERMS, changed
 from hexapod_cosim.extensions.gym.settings import task as task_settings
 
-MODES = {
-    AutoresetMode.NEXT_STEP: "next_step",
-    AutoresetMode.SAME_STEP: "same_step",
-    AutoresetMode.DISABLED: "disabled",
-}
 Result = tuple[
     NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
 ]
@@ -74,7 +69,7 @@ class HexapodVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArr
         self.single_observation_space = observation_space(self.settings)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._batch = Batch(self.settings, num_envs, threads=threads, autoreset=MODES[mode])
+        self._batch = Batch(self.settings, num_envs, threads=threads, autoreset=mode.name.lower())
         self._seeded = False
         self._begun = np.zeros(num_envs, bool)
         self._ended = np.zeros(num_envs, bool)  # by the last step

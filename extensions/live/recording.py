@@ -14,7 +14,8 @@ from typing import TypeVar
 import tomlkit
 
 from hexapod_cosim.controller import BodyCommand
-from hexapod_cosim.cosim.scenario.records import WHOLE_LEG, Command, Push, Scenario, ServoFault
+from hexapod_cosim.cosim.scenario.events import WHOLE_LEG, Push, ServoFault
+from hexapod_cosim.cosim.scenario.records import Command, Scenario
 from hexapod_cosim.models import LEG_NAMES
 
 LONGEST = 600.0  # s

@@ -6,14 +6,12 @@ results.parquet has all runs in the order of their numbers and is the same howev
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-from filelock import FileLock, Timeout
 
 from hexapod_cosim.cosim.common.files import (
     RESUMABLE,
@@ -32,7 +30,7 @@ from hexapod_cosim.extensions.study.rules import leaves
 from hexapod_cosim.extensions.study.store import BOOLEAN, INTEGER, REAL, TEXT, WALL, Store, quoted
 
 KIND = "study"  # in run.json
-MANIFEST, LOCK, RESULTS, OPTIMUM = "manifest.json", ".lock", "results.parquet", "optimum.json"
+MANIFEST, RESULTS, OPTIMUM = "manifest.json", "results.parquet", "optimum.json"
 MAX_NAMED = 6  # differences in a message
 PARQUET_TYPES = {INTEGER: pa.int64(), REAL: pa.float64(), TEXT: pa.string(), BOOLEAN: pa.bool_()}
 
@@ -78,25 +76,6 @@ def _compare(stored: Mapping[str, Any], now: Mapping[str, Any], folder: Path) ->
             fix="choose another folder with -o, or put back what changed",
             where=str(folder),
         )
-
-
-@contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Locks a folder: within the block no other process runs a study into it. Raises StudyError.
-
-    On a file system without locks the folder is not locked.
-    """
-    lock = FileLock(folder / LOCK, blocking=False, fallback_to_soft=False)
-    with suppress(NotImplementedError):  # a file system without locks
-        try:
-            lock.acquire()
-        except Timeout as error:
-            what, fix = "another process runs a study into this folder", "wait for it, or use -o"
-            raise StudyError(what, fix=fix, where=str(folder)) from error
-    try:
-        yield
-    finally:
-        lock.release()
 
 
 def export_runs(store: Store, folder: Path) -> None:

@@ -37,16 +37,8 @@ from hexapod_cosim.extensions.study.records import (
 from hexapod_cosim.extensions.study.rules import Rules, read_table, require
 from hexapod_cosim.models import HexapodError, unknown_name
 from hexapod_cosim.models.errors import refuse_path
-from hexapod_cosim.models.files import read_text
-from hexapod_cosim.models.schema import (
-    Choice,
-    Flag,
-    Text,
-    Whole,
-    expect_table,
-    parse_toml,
-    reading_toml,
-)
+from hexapod_cosim.models.files import parse_toml, read_text, reading_toml
+from hexapod_cosim.models.schema import Choice, Flag, Text, Whole, expect_table
 
 OF_A_SWEEP = ("factors", "design", "points", "seeds", "controls")  # not of an optimisation
 

@@ -26,6 +26,7 @@ from hexapod_cosim.cosim.cli.terminal import (
 )
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import METHOD
+from hexapod_cosim.cosim.results.folder import locked
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.worker_pool import processor_count
 from hexapod_cosim.extensions.study.dispatch import (
@@ -36,13 +37,7 @@ from hexapod_cosim.extensions.study.dispatch import (
     dispatch,
     local_workers,
 )
-from hexapod_cosim.extensions.study.folder import (
-    RESULTS,
-    begin_folder,
-    export_runs,
-    finish_folder,
-    locked,
-)
+from hexapod_cosim.extensions.study.folder import RESULTS, begin_folder, export_runs, finish_folder
 from hexapod_cosim.extensions.study.job import make_job, manifest_of
 from hexapod_cosim.extensions.study.orders import count_runs, sweep_orders
 from hexapod_cosim.extensions.study.page import (

@@ -1,8 +1,7 @@
-"""Computes the forces of all contacts with any ground, and defines their state, which holds from
-touch-down to lift-off.
+"""Computes the forces of all contacts with any ground, and defines their state.
 
 A foot touches the ground below it and, on blocks, up to three higher blocks beside it; torso, knees
-and shanks are the spheres of spheres.py. A closed contact keeps its damping (eq. 14) and the
+and shanks are the spheres of bodies.py. A closed contact keeps its damping (eq. 14) and the
 ground on which it touched down: stiffness, friction or soil. Forces are those of rigid ground
 (law.py) or of soil (soil/law.py).
 """
@@ -15,25 +14,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.bodies import (
+    BodySphere,
+    body_contact,
+    body_spheres,
+    leg_pairs,
+    open_body_contact,
+    pair_contacts,
+)
 from hexapod_cosim.models.contact.geometry import (
     FootContact,
     contact_shares,
     slip_velocity,
     sphere_contact,
+    turning_moment,
 )
-from hexapod_cosim.models.contact.law import Contact, contact_damping, normal_force
-from hexapod_cosim.models.contact.pairs import leg_pairs, pair_contacts
-from hexapod_cosim.models.contact.spheres import (
-    BodySphere,
-    body_contact,
-    body_spheres,
-    sliding_friction_of_bodies,
-)
-from hexapod_cosim.models.friction import Friction, bristle_rate, friction_force, turning_moment
+from hexapod_cosim.models.contact.law import ContactState, normal_force
+from hexapod_cosim.models.friction import bristle_rate, friction_force
 from hexapod_cosim.models.ground.blocks import TOP, Cell
 from hexapod_cosim.models.ground.faces import faces_of_feet, ground_face, surface_of
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, rotation_matrix
-from hexapod_cosim.models.records import Foot, Robot, Soil
+from hexapod_cosim.models.records import Foot, Robot
 from hexapod_cosim.models.soil.law import shear_force, shear_limit, shear_rate, soil_normal_force
 
 NEAREST = "nearest"  # face of torso, knees and shanks
@@ -51,27 +52,6 @@ class Candidate:
     def is_sole(self) -> bool:
         """Whether this is a foot on the ground below it, which has bristles."""
         return self.face == TOP
-
-
-@dataclass(frozen=True)
-class ContactState:
-    """State of a contact, which holds from touch-down to lift-off."""
-
-    contact: Contact  # with the stiffness of the ground where it touched down
-    friction: Friction
-    soil: Soil
-    damping: float = math.nan  # s/m  d of eq. 14; nan: open
-    impact_speed: float = 0.0  # m/s  at the last touch-down
-
-    @property
-    def is_open(self) -> bool:
-        """Whether the sphere does not touch the face."""
-        return math.isnan(self.damping)
-
-    @property
-    def is_soft(self) -> bool:
-        """Whether the contact is on soil."""
-        return self.soil.law != "none"
 
 
 @dataclass(frozen=True)
@@ -111,36 +91,17 @@ def candidates(robot: Robot) -> tuple[Candidate, ...]:
 
 def own_ground(robot: Robot, point: Candidate) -> ContactState:
     """Returns an open contact with the ground of the robot file, without the surface's patches."""
-    soil = robot.soil if point.is_sole else Soil()
-    return ContactState(robot.contact, _friction_of(robot.friction, point), soil)
-
-
-def _friction_of(friction: Friction, point: Candidate) -> Friction:
-    """Returns the friction of a contact: bristles belong to soles alone."""
-    return friction if point.is_sole else sliding_friction_of_bodies(friction)
+    if not point.is_sole:  # bristles and soil are those of soles alone
+        return open_body_contact(robot)
+    return ContactState(robot.contact, robot.friction, robot.soil)
 
 
 def open_contacts(robot: Robot) -> Contacts:
     """Returns the contacts of a robot in the air, over undisturbed ground."""
     states = tuple(own_ground(robot, point) for point in candidates(robot))
-    pairs = (open_pair(robot),) * len(leg_pairs(robot))
+    pairs = (open_body_contact(robot),) * len(leg_pairs(robot))
     nothing = np.zeros(LEGS), np.zeros((LEGS, 2)), (None,) * LEGS, np.zeros((0, 4))
     return Contacts(states, *nothing, pairs)
-
-
-def open_pair(robot: Robot) -> ContactState:
-    """Returns an open contact between legs: the robot's own laws, without bristles and soil."""
-    return ContactState(robot.contact, sliding_friction_of_bodies(robot.friction), Soil())
-
-
-def standing_pairs(robot: Robot, body: Array) -> tuple[ContactState, ...]:
-    """Returns the contacts between legs of bodies (19, 13): those that overlap are closed, with
-    impact speed 0.
-    """
-    state = open_pair(robot)
-    closed = replace(state, damping=contact_damping(robot.contact, 0.0))
-    found = pair_contacts(robot, body)
-    return tuple(closed if contact.penetration > 0.0 else state for contact in found)
 
 
 def contacts_of(robot: Robot, damping: Array, body_damping: Array | None = None) -> Contacts:
@@ -301,11 +262,6 @@ def pair_wrenches(robot: Robot, body: Array, contacts: Contacts) -> Array:
             torque = cross(contact.point - body[number, 0:3], force)
             g[number] += sign * np.concatenate([force, torque])
     return g
-
-
-def has_bristles(state: ContactState) -> bool:
-    """Returns whether a sole has bristles, those of friction or of shear in soil."""
-    return state.is_soft or state.friction.has_bristles
 
 
 def contact_bristle_rate(state: ContactState, contact: FootContact, bristle: Array) -> Array:

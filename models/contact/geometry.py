@@ -1,6 +1,7 @@
-"""Computes where spheres touch the ground, how fast, and with which force.
+"""Computes where spheres touch the ground, how fast, and with which force and moment.
 
-The normal force is that of law.py, friction that of friction.py. The force of a foot is shared
+The normal force is that of law.py, friction that of friction.py; the moments of spin and rolling
+(eq. 38) follow from both. The force of a foot is shared
 among faces, edges and corners of blocks that are close on it (`contact_shares`).
 """
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.law import Contact, contact_damping, normal_force
-from hexapod_cosim.models.friction import friction_force, turning_moment
+from hexapod_cosim.models.friction import LAWS, Friction, friction_force, sliding_friction
 from hexapod_cosim.models.ground.faces import Face, ground_faces
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, foot_centres, skew
 from hexapod_cosim.models.records import Robot
@@ -85,6 +86,39 @@ def foot_moment(robot: Robot, foot: FootContact, damping: float, turn: Array) ->
     """
     f_n = normal_force(robot.contact, damping, foot.penetration, foot.approach_speed)
     return turning_moment(robot.friction, robot.foot.radius, f_n, foot.normal, turn)
+
+
+def turning_slopes(
+    friction: Friction, radius: float, normal: Array, turn: Array
+) -> tuple[float, float]:
+    """Returns the moments of spin and rolling friction over load and angular speed [m s] (eq. 38).
+
+    radius: that of the sphere [m]; its speeds R |w_n| and R |w_t| regularise the moments.
+    normal: (3,) of the ground; turn: angular velocity (3,) [rad/s].
+    """
+    direction = LAWS[friction.law].direction
+    spin = float(normal @ turn)
+    slow = radius * abs(spin)
+    fast = radius * float(np.linalg.norm(turn - spin * normal))
+    return (
+        friction.spin_radius
+        * radius
+        * sliding_friction(friction, slow)
+        * direction(friction, slow),
+        friction.rolling_radius * radius * direction(friction, fast),
+    )
+
+
+def turning_moment(
+    friction: Friction, radius: float, load: float, normal: Array, turn: Array
+) -> Array:
+    """Returns the moment (3,) [N m] of spin and rolling friction at a load [N] (eq. 38).
+
+    The other arguments are those of `turning_slopes`.
+    """
+    spin, roll = turning_slopes(friction, radius, normal, turn)
+    about = float(normal @ turn) * normal
+    return -load * (spin * about + roll * (turn - about))
 
 
 def slip_velocity(contact: FootContact) -> Array:

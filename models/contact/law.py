@@ -1,4 +1,5 @@
-"""Defines the normal contact laws: the data of a contact and its force with restitution (eq. 14).
+"""Defines what touches, and the normal contact laws: the data of a contact and its force with
+restitution (eq. 14).
 
 f_n = K delta^1.5 max(0, 1 + d ddelta). Touch-down fixes d [s/m] by the approach speed, and d holds
 until lift-off. Most laws have the form d = chi(e) / v0 and differ in chi(e).
@@ -11,7 +12,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated
 
-from hexapod_cosim.models.schema import Choice, Number
+from hexapod_cosim.models.arrays import Vector3
+from hexapod_cosim.models.friction import Friction
+from hexapod_cosim.models.schema import Choice, Number, Vector
+from hexapod_cosim.models.soil.presets import Soil
+
+BODY_CONTACTS = ("off", "on")
+SELF_CONTACTS = ("off", "warn", "force")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +31,60 @@ class Contact:
     restitution: Annotated[float, Number("1", at_least=0.0, at_most=1.0)]
     damping_factor: Annotated[float, Number("s/m", at_least=0.0)]  # c of the constant law
     impact_speed_floor: Annotated[float, Number("m/s", above=0.0)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyContact:
+    """Spheres that touch the ground besides the feet; parts of size 0 do not.
+
+    The radii of knee and shank are also those of femur and tibia, as capsules, in the distances
+    between neighbouring legs, which do not depend on `contact`.
+    """
+
+    contact: Annotated[str, Choice(BODY_CONTACTS)] = "off"
+    # whether a run warns of neighbouring legs that overlap, or these push each other
+    self_contact: Annotated[str, Choice(SELF_CONTACTS)] = "off"
+    # half edges of a box along the torso's axes, with a sphere around each corner
+    torso_box: Annotated[Vector3, Vector("m", 3)] = (0.0, 0.0, 0.0)
+    # centre of the box, from the torso's origin
+    torso_centre: Annotated[Vector3, Vector("m", 3)] = (0.0, 0.0, 0.0)
+    corner_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
+    knee_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
+    shank_radius: Annotated[float, Number("m", at_least=0.0)] = 0.0
+    # of the shank's sphere: 0 at the tibia's joint, 1 at the foot's centre
+    shank_position: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = 0.5
+
+    @property
+    def tibia_spheres(self) -> list[tuple[str, float, float]]:
+        """Name, radius [m] and place of knee and shank, 0 at the joint to 1 at the foot."""
+        parts = [("knee", self.knee_radius, 0.0), ("shank", self.shank_radius, self.shank_position)]
+        return [part for part in parts if part[1] > 0.0]
+
+
+@dataclass(frozen=True)
+class ContactState:
+    """State of a contact, which holds from touch-down to lift-off."""
+
+    contact: Contact  # with the stiffness of the ground where it touched down
+    friction: Friction
+    soil: Soil
+    damping: float = math.nan  # s/m  d of eq. 14; nan: open
+    impact_speed: float = 0.0  # m/s  at the last touch-down
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the sphere does not touch the face."""
+        return math.isnan(self.damping)
+
+    @property
+    def is_soft(self) -> bool:
+        """Whether the contact is on soil."""
+        return self.soil.law != "none"
+
+    @property
+    def has_bristles(self) -> bool:
+        """Whether a sole has bristles, those of friction or of shear in soil."""
+        return self.is_soft or self.friction.has_bristles
 
 
 # below it the closed form of _log_rest loses more digits than its series omits

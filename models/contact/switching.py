@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.bodies import pair_contacts, standing_pairs
 from hexapod_cosim.models.contact.forces import (
     Candidate,
     Contacts,
-    ContactState,
     candidates,
     contacts_at,
     has_soil,
@@ -23,17 +23,17 @@ from hexapod_cosim.models.contact.forces import (
     own_ground,
     shares_of_feet,
     sphere_centre,
-    standing_pairs,
 )
 from hexapod_cosim.models.contact.geometry import FootContact
-from hexapod_cosim.models.contact.law import contact_damping
-from hexapod_cosim.models.contact.pairs import pair_contacts
+from hexapod_cosim.models.contact.law import ContactState, contact_damping
 from hexapod_cosim.models.ground.blocks import Cell, cell_at, outside
-from hexapod_cosim.models.ground.faces import surface_of
+from hexapod_cosim.models.ground.faces import blocks_of, surface_of
 from hexapod_cosim.models.ground.surface import LAW, MU, MU_STATIC, STIFFNESS
 from hexapod_cosim.models.kinematics import LEGS, foot_centres
-from hexapod_cosim.models.records import Robot, Soil
+from hexapod_cosim.models.method import deepest
+from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.soil.law import plastic_depth, row_soil, soil_radius
+from hexapod_cosim.models.soil.presets import Soil
 
 LEAST_FOOTPRINT = 1e-6  # m  shallower ones are not recorded
 SAME_FACE = 1e-6  # m, 1  depth and normal of one contact at both sides of a border between cells
@@ -49,33 +49,19 @@ class Depths:
     outside: Array  # (6,) m  < 0: inside; -FAR: no cell is assigned
 
 
-def has_cells(robot: Robot) -> bool:
-    """Returns whether the ground consists of blocks."""
-    surface = surface_of(robot.terrain)
-    return surface is not None and surface.kind == "blocks"
-
-
 def depths_of(robot: Robot, body: Array, contacts: Contacts) -> Depths:
     """Returns the depths of all contacts at bodies (19, 13)."""
     found = [*contacts_at(robot, body, contacts), *pair_contacts(robot, body)]
     delta = np.array([contact.penetration for contact in found])
     delta[:LEGS] -= contacts.plastic
     far = np.full(LEGS, -FAR)
-    surface = surface_of(robot.terrain)
-    if surface is not None and has_cells(robot):
+    surface = blocks_of(robot.terrain)
+    if surface is not None:
         for leg, at in enumerate(foot_centres(robot, body)):
             cell = contacts.cell[leg]
             if cell is not None:
                 far[leg] = outside(surface, float(at[0]), float(at[1]), cell)
     return Depths(delta, np.array([contact.approach_speed for contact in found]), far)
-
-
-def has_contact(robot: Robot, contacts: Contacts, leg: int) -> bool:
-    """Returns whether a foot has a contact."""
-    return any(
-        point.leg == leg and not state.is_open
-        for point, state in zip(candidates(robot), contacts.states, strict=True)
-    )
 
 
 # touch-down and lift-off
@@ -93,7 +79,6 @@ def ground_under(robot: Robot, point: Candidate, centre: Array) -> ContactState:
     if number == 0:
         return state
     row = surface.materials[number - 1]
-    # a row with a kinetic coefficient alone has no higher static one
     mu = state.friction.mu if math.isnan(row[MU]) else float(row[MU])
     fallback = state.friction.mu_static if math.isnan(row[MU]) else mu
     mu_static = fallback if math.isnan(row[MU_STATIC]) else float(row[MU_STATIC])
@@ -132,14 +117,15 @@ def start_contacts(robot: Robot, body: Array) -> Contacts:
 
 def assign_cells(robot: Robot, body: Array, contacts: Contacts) -> Contacts:
     """Holds the cells of feet that touch blocks, and releases those of others."""
-    surface = surface_of(robot.terrain)
-    if surface is None or not has_cells(robot):
+    surface = blocks_of(robot.terrain)
+    if surface is None:
         return contacts
+    states = zip(candidates(robot), contacts.states, strict=True)
+    touching = {point.leg for point, state in states if not state.is_open}
     cells: list[Cell | None] = []
     for leg, at in enumerate(foot_centres(robot, body)):
         below = cell_at(surface, float(at[0]), float(at[1]))
-        holds = has_contact(robot, contacts, leg)
-        cells.append((contacts.cell[leg] or below) if holds else None)
+        cells.append((contacts.cell[leg] or below) if leg in touching else None)
     return replace(contacts, cell=tuple(cells))
 
 
@@ -154,7 +140,7 @@ def switch_contacts(
     if has_soil(robot):
         contacts, delta = update_footprints(robot, body, contacts, delta)
     states, touchdowns = list(contacts.states), 0
-    walls = has_cells(robot)
+    walls = blocks_of(robot.terrain) is not None
     found = contacts_at(robot, body, contacts) if walls else []
     for k, point in enumerate(candidates(robot)):
         if states[k].is_open and delta[k] > 0.0:
@@ -207,21 +193,6 @@ def _continued(
 
 
 # soil
-
-
-def deepest(start: float, slope_start: float, end: float, slope_end: float) -> float:
-    """Returns the largest value on [0, 1] of the cubic with these ends and slopes (eq. 28)."""
-    if not (slope_start > 0.0 and slope_end < 0.0):
-        return max(start, end)
-    bend = slope_start + slope_end - 2.0 * (end - start)
-    curve = end - start - slope_start - bend
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        x = 0.5 * (low + high)
-        rises = slope_start + x * (2.0 * curve + 3.0 * x * bend) > 0.0
-        low, high = (x, high) if rises else (low, x)
-    top = start + low * (slope_start + low * (curve + low * bend))
-    return max(top, start, end)
 
 
 def footprint_depth(footprints: Array, centre: Array) -> float:
@@ -290,8 +261,7 @@ def cross_cells(robot: Robot, body: Array, contacts: Contacts, depths: Depths) -
         return contacts
     cells = list(contacts.cell)
     for leg in gone:
-        x, y, _ = foot_centres(robot, body)[leg].tolist()
-        cells[leg] = cell_at(surface, x, y)
+        cells[leg] = cell_at(surface, *foot_centres(robot, body)[leg, :2].tolist())
     moved = replace(contacts, cell=tuple(cells))
     before, after = contacts_at(robot, body, contacts), contacts_at(robot, body, moved)
     closed = [j for j, state in enumerate(contacts.states) if not state.is_open]
@@ -322,6 +292,4 @@ def continued_state(
     """Returns a contact that continues in another face. Bristles are those of soles."""
     if from_.is_sole and to.is_sole:
         return old
-    law = before.friction.law
-    static = replace(old.friction, law=law)
-    return replace(old, friction=static)
+    return replace(old, friction=replace(old.friction, law=before.friction.law))

@@ -16,8 +16,7 @@ from hexapod_cosim.models.ground.blocks import (
     cell_at,
 )
 from hexapod_cosim.models.ground.smooth import height_and_slopes, heights_at, smooth_distance
-from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import Terrain
+from hexapod_cosim.models.ground.surface import Surface, Terrain
 
 Face = tuple[float, Array]  # distance [m], positive above the ground, and unit normal (3,)
 
@@ -25,6 +24,12 @@ Face = tuple[float, Array]  # distance [m], positive above the ground, and unit 
 def surface_of(terrain: Terrain) -> Surface | None:
     """Returns the surface of a ground of the kind grid, None for a plane."""
     return terrain.surface if terrain.kind == "grid" else None
+
+
+def blocks_of(terrain: Terrain) -> Surface | None:
+    """Returns the surface of a ground of blocks, None for another ground."""
+    surface = surface_of(terrain)
+    return surface if surface is not None and surface.kind == "blocks" else None
 
 
 def ground_normal(terrain: Terrain) -> Array:
@@ -76,8 +81,7 @@ def ground_faces(terrain: Terrain, point: Array) -> list[Face]:
 
 def faces_of_feet(terrain: Terrain) -> tuple[str, ...]:
     """Returns the kinds of faces that a foot may touch at once, first that of the ground below."""
-    surface = surface_of(terrain)
-    return FACES if surface is not None and surface.kind == "blocks" else (TOP,)
+    return (TOP,) if blocks_of(terrain) is None else FACES
 
 
 def ground_face(terrain: Terrain, point: Array, kind: str, cell: Cell | None) -> Face | None:
@@ -86,8 +90,8 @@ def ground_face(terrain: Terrain, point: Array, kind: str, cell: Cell | None) ->
     cell: of blocks around which the faces are, None: that below the point. Returns None for a wall
     that is not there.
     """
-    surface = surface_of(terrain)
-    if surface is None or surface.kind != "blocks":
+    surface = blocks_of(terrain)
+    if surface is None:
         return ground_faces(terrain, point)[0]
     above = point - np.array([0.0, 0.0, terrain.height])
     around = cell_at(surface, float(point[0]), float(point[1])) if cell is None else cell

@@ -44,11 +44,6 @@ class HeightFile(NamedTuple):
     place: Callable[[int, int], str]  # where (row, column) is in the file, for messages
 
 
-def _refused(path: Path, what: str, got: str, expected: str, fix: str) -> RobotError:
-    """Returns the exception for a file of another content."""
-    return RobotError(what, got=got, expected=expected, fix=fix, where=str(path))
-
-
 def _read_png(path: Path) -> HeightFile:
     """Returns the grey levels of a picture, which has no scales."""
     # Pillow takes a moment to import, and few robots have height maps
@@ -74,7 +69,8 @@ def _read_png(path: Path) -> HeightFile:
 
 def _not_grey(path: Path, got: str) -> RobotError:
     fix = "save the map again in grey, best with 16 bits, or give heights in metres as a .npy array"
-    return _refused(path, NO_MAP, got, "PNG with 8 or 16 bits of grey per pixel", fix)
+    expected = "PNG with 8 or 16 bits of grey per pixel"
+    return RobotError(NO_MAP, got=got, expected=expected, fix=fix, where=str(path))
 
 
 def _read_npy(path: Path) -> HeightFile:
@@ -94,7 +90,8 @@ def _read_npy(path: Path) -> HeightFile:
 
 def _wrong_array(path: Path, got: str) -> RobotError:
     expected = "an array with two axes (rows along +y, columns along +x) of real numbers"
-    return _refused(path, NO_MAP, got, expected, "write it with numpy.save")
+    fix = "write it with numpy.save"
+    return RobotError(NO_MAP, got=got, expected=expected, fix=fix, where=str(path))
 
 
 READERS: dict[str, Callable[[Path], HeightFile]] = {".png": _read_png, ".npy": _read_npy}

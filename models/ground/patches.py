@@ -83,13 +83,8 @@ def _read_patch(value: Any, where: str) -> dict[str, Any]:
         fix = "say in what the patch differs"
         raise RobotError(what, got=sorted(found), expected=expected, fix=fix, where=where)
     if "soil" in found:
-        check_soil(found["soil"], f"{where}.soil")
+        soil_preset(found["soil"], where=f"{where}.soil")  # refuses an unknown one
     return found
-
-
-def check_soil(name: str, where: str) -> None:
-    """Raises RobotError for an unknown soil."""
-    soil_preset(name, where=where)
 
 
 def material_row(patch: Mapping[str, Any]) -> Array:

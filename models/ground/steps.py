@@ -73,11 +73,6 @@ def _edge(platform: float, cell: float) -> float:
     return cell * math.ceil(0.5 * platform / cell - 1e-9)
 
 
-def _stairs_along(distance: Array, width: float, number: float) -> Array:
-    """Returns the number of steps passed at a distance [m] from their begin, up to `number`."""
-    return np.clip(np.floor(distance / width + 1.0), 0.0, number)
-
-
 @entry(
     BLOCKS,
     "Stairs up along +x and a landing",
@@ -88,7 +83,8 @@ def stairs(values: SimpleNamespace) -> Surface:
     cell = _fitting(values.step_width, values.horizontal_scale)
     x, y = _cells(values.size, values.size, cell)
     begin = _edge(values.platform_size, cell)
-    passed = _stairs_along(x - begin, values.step_width, values.num_steps)
+    # the number of steps passed, from their begin on
+    passed = np.clip(np.floor((x - begin) / values.step_width + 1.0), 0.0, values.num_steps)
     return _surface("stairs", x, y, cell, values.step_height * passed)
 
 

@@ -1,4 +1,4 @@
-"""Defines a surface of uneven ground: a grid of heights with materials.
+"""Defines the ground, and a surface of uneven ground: a grid of heights with materials.
 
 A smooth surface has its heights at nodes (x0 + cell column, y0 + cell row) and is bicubic between
 them (smooth.py). A surface of blocks has flat cells with vertical walls between them (blocks.py):
@@ -13,16 +13,19 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import RobotError, unknown_name
+from hexapod_cosim.models.schema import Choice, Number
 
 Bytes = NDArray[np.uint8]
 
+TERRAINS = ("flat", "slope", "grid")
+PLANES = ("flat", "slope")  # kinds of ground without a surface
 KINDS = ("smooth", "blocks")  # numbered from 1 in grid files
 MATERIAL_COLUMNS = 16  # numbers of a material, as grid_file.py lists them
 MU, MU_STATIC, STIFFNESS, LAW = range(4)  # the first ones; the soil's numbers follow its law
@@ -197,3 +200,25 @@ def _check_materials(surface: Surface) -> None:
             expected=f"a map {surface.height.shape} and a table (count, {MATERIAL_COLUMNS})",
             where=surface.name,
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Terrain:
+    """The ground: level, a slope that rises by `incline` along `heading`, or a surface.
+
+    The heights of a surface are above `height`. Files give the name of the surface as `kind`, which
+    is "grid" here.
+    """
+
+    kind: Annotated[str, Choice(TERRAINS)]
+    height: Annotated[float, Number("m")] = 0.0
+    incline: Annotated[float, Number("rad", above=-math.pi / 2, below=math.pi / 2)] = 0.0
+    heading: Annotated[float, Number("rad")] = 0.0
+    surface: Surface | None = None  # of the kind grid; other kinds do not use it
+
+    @property
+    def name(self) -> str:
+        """The kind as files give it: flat, slope or the name of a surface."""
+        if self.kind != "grid" or self.surface is None:
+            return self.kind
+        return str(self.surface.recipe.get("kind", self.surface.name))

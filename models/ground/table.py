@@ -15,17 +15,10 @@ from typing import Any
 from hexapod_cosim.models.errors import RobotError, refuse_path, unknown_name
 from hexapod_cosim.models.ground.height_map import MAPS
 from hexapod_cosim.models.ground.parameters import Entries, Entry, read_values, with_defaults
-from hexapod_cosim.models.ground.patches import (
-    PATCH,
-    check_soil,
-    read_patches,
-    with_patches,
-    with_soil,
-)
+from hexapod_cosim.models.ground.patches import PATCH, read_patches, with_patches, with_soil
 from hexapod_cosim.models.ground.rough import SMOOTH
 from hexapod_cosim.models.ground.steps import BLOCKS
-from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import PLANES, Terrain
+from hexapod_cosim.models.ground.surface import PLANES, Surface, Terrain
 from hexapod_cosim.models.schema import (
     Choice,
     Spec,
@@ -34,6 +27,7 @@ from hexapod_cosim.models.schema import (
     refuse_unknown_keys,
     specs,
 )
+from hexapod_cosim.models.soil.presets import soil_preset
 
 MOST_NODES = 1 << 24  # of a generated surface
 KEPT = 32  # surfaces in the cache
@@ -91,7 +85,7 @@ def _made(
     _check_size(values, where)
     surface = entry.make(SimpleNamespace(**values))
     if "soil" in values:
-        check_soil(values["soil"], f"{where}.soil")
+        soil_preset(values["soil"], where=f"{where}.soil")  # refuses an unknown one
         surface = with_soil(surface, values["soil"])
     return with_patches(surface, [dict(patch) for patch in patches], where=f"{where}.patch")
 
@@ -196,13 +190,16 @@ def merged_terrain(own: Terrain, given: Mapping[str, Any], where: str) -> Terrai
     return read_terrain({"kind": own.name, **kept, **placed, **given}, where)
 
 
-def beside(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Returns [terrain] with its `file` as an absolute path, relative to a folder until then."""
-    file = table.get("file")
-    if not isinstance(file, str) or not file:
-        return dict(table)
+def terrain_beside(tables: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Returns a file's tables in which `file` of [terrain], relative to a folder until then, is an
+    absolute path.
+    """
+    terrain = tables.get("terrain")
+    file = terrain.get("file") if isinstance(terrain, Mapping) else None
+    if terrain is None or not isinstance(file, str) or not file:
+        return dict(tables)
     refuse_path(file, "the height map", RobotError)
-    return {**table, "file": str((folder / file).resolve())}
+    return {**tables, "terrain": {**terrain, "file": str((folder / file).resolve())}}
 
 
 def terrain_table(terrain: Terrain) -> dict[str, Any]:

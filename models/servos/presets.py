@@ -111,7 +111,7 @@ def servo_table(value: Any, where: str) -> Mapping[str, Any]:
     if GAIN in table:
         gain = read_given(About, {GAIN: table.pop(GAIN)}, where)[GAIN]
     given = {**fields, **read_given(Servo, table, where)}
-    _check_constants(given, where)
+    check_constants(given, where)
     complete = _with_motor(given, gain)
     refuse_others(given, complete, where)
     return complete
@@ -130,7 +130,7 @@ def _with_motor(given: Mapping[str, Any], gain: float | None) -> dict[str, Any]:
     return own | {key: getattr(servo, key) for key in FOLLOWING}
 
 
-def _check_constants(own: Mapping[str, Any], where: str) -> None:
+def check_constants(own: Mapping[str, Any], where: str) -> None:
     """Raises RobotError for a motor that lacks a constant or has one that is 0."""
     for key in ("voltage", "torque_constant", "resistance"):
         if not own.get(key, 0.0) > 0.0:

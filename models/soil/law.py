@@ -17,9 +17,17 @@ from collections.abc import Callable
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
-from hexapod_cosim.models.records import Foot, Soil
+from hexapod_cosim.models.records import Foot
+from hexapod_cosim.models.soil.presets import SOIL_LAWS, Soil
 
 REACHED = 1e-8  # m  short of the virgin curve: links are off their joints by less
+# fields of a law's virgin curve, in the order of a material's columns 4 to 6
+CURVES: dict[str, tuple[str, ...]] = {
+    "none": (),
+    "bekker": ("frictional_modulus", "cohesive_modulus", "exponent"),
+    "granular": ("resistance", "alpha_down", "alpha_ahead"),
+    "mud": ("yield_pressure", "hardening"),
+}
 BISECTIONS = 200  # halvings of an interval, more than doubles resolve
 
 
@@ -230,15 +238,12 @@ def table_row(soil: Soil) -> tuple[float, ...]:
     (granular) or yield pressure and hardening (mud); 7-11 are c, tan phi, K, Ke, R; 12 is
     alpha_side.
     """
-    curve = {
-        "none": (0.0, 0.0, 0.0),
-        "bekker": (soil.frictional_modulus, soil.cohesive_modulus, soil.exponent),
-        "granular": (soil.resistance, soil.alpha_down, soil.alpha_ahead),
-        "mud": (soil.yield_pressure, soil.hardening, 0.0),
-    }[soil.law]
-    law = float(("none", "bekker", "granular", "mud").index(soil.law))
+    curve = [getattr(soil, name) for name in CURVES[soil.law]]
+    unused = [0.0] * (3 - len(curve))
+    law = float(SOIL_LAWS.index(soil.law))
     shear = (soil.cohesion, math.tan(soil.friction_angle), soil.shear_displacement)
-    return (law, *curve, *shear, soil.stiffness, soil.damping, soil.alpha_side, 0.0, 0.0, 0.0)
+    rest = (soil.stiffness, soil.damping, soil.alpha_side, 0.0, 0.0, 0.0)
+    return (law, *curve, *unused, *shear, *rest)
 
 
 def row_soil(row: Array) -> Soil:
@@ -246,14 +251,9 @@ def row_soil(row: Array) -> Soil:
     law, first, second, third, cohesion, friction, displacement, stiffness, damping, side, *_ = (
         float(number) for number in row
     )
-    name = ("none", "bekker", "granular", "mud")[int(law)]
+    name = SOIL_LAWS[int(law)]
     if name == "none":
         return Soil()
-    fields = {
-        "bekker": ("frictional_modulus", "cohesive_modulus", "exponent"),
-        "granular": ("resistance", "alpha_down", "alpha_ahead"),
-        "mud": ("yield_pressure", "hardening"),
-    }[name]
     return Soil(
         law=name,
         cohesion=cohesion,
@@ -262,7 +262,7 @@ def row_soil(row: Array) -> Soil:
         stiffness=stiffness,
         damping=damping,
         alpha_side=side,
-        **dict(zip(fields, (first, second, third), strict=False)),
+        **dict(zip(CURVES[name], (first, second, third), strict=False)),
     )
 
 

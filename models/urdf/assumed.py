@@ -1,4 +1,6 @@
-"""Computes defaults for data that a URDF lacks, scaled from the ATHENA-like robot."""
+"""Completes the tables of a URDF: defaults for data that it lacks, scaled from the ATHENA-like
+robot, and one number for all joints or feet.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +11,16 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.errors import RobotError
+from hexapod_cosim.models.kinematics import axis_rotation
 from hexapod_cosim.models.records import JOINT_NAMES
+from hexapod_cosim.models.urdf.elements import Urdf
+from hexapod_cosim.models.urdf.legs import FoundLeg
 
 Table = dict[str, Any]
 
+# keys of the servo, and of a joint in the URDF
+SIZES = {"torque_max": "effort", "speed_max": "velocity", "coulomb_friction": "friction"}
 TORQUE_ANGLE = 0.15  # rad    error at which the servo gives all it has: kp
 DAMPING_TIME = 0.02  # s    kd / kp
 ROTOR_TIME = math.sqrt(0.01 / 40.0)  # s    sqrt(rotor inertia / kp)
@@ -24,6 +32,70 @@ FEMUR_RISE, TIBIA_RISE = (
 STRIDE, STEP_HEIGHT = 2.0 / 3.0, 1.0 / 3.0  # 1    of the height of the hips above the feet
 # s, m    of the ATHENA-like robot; robots of other heights walk at the same Froude number
 GAIT_PERIOD, HIP_HEIGHT = 1.0, 0.12
+
+
+def complete(table: Table, legs: list[FoundLeg], urdf: Urdf) -> list[str]:
+    """Fills in missing values, in place; returns the names of assumed ones."""
+    _unify(table, legs, urdf)
+    assumed = ["foot.radius"] if any(leg.radius is None for leg in legs) else []
+    assumed += [f"servo.{key}" for key in assume_servo(table["servo"])]
+    stances = assume_stances(table["legs"])
+    assumed += ["stance"] if stances else []
+    return assumed + [f"gait.{key}" for key in assume_gait(table["gait"], _height(table))]
+
+
+def add_damping(table: Table, legs: list[FoundLeg], assumed: list[str]) -> Table:
+    """Adds the mean damping of the joints to an assumed kd, in place; returns the note about it."""
+    damping = float(np.mean([branch.joint.damping for leg in legs for branch in leg.servo]))
+    if damping == 0.0:
+        return {}
+    if "servo.kd" in assumed:
+        table["servo"]["kd"] += damping
+    done = "added to" if "servo.kd" in assumed else "without effect beside the given"
+    return {"URDF, damping": f"{damping:.6g} N m s/rad of the joints, {done} servo.kd"}
+
+
+def _unify(table: Table, legs: list[FoundLeg], urdf: Urdf) -> None:
+    """Replaces lists of one number per joint or foot by a single number, in place."""
+    joints = [name for leg in legs for name in leg.joints]
+    for key, name in SIZES.items():
+        _unify_one(table, f"servo.{key}", joints, name, urdf.where)
+    _unify_one(table, "foot.radius", [leg.joints[2] for leg in legs], "radius", urdf.where)
+
+
+def _unify_one(table: Table, key: str, owners: list[str], name: str, where: str) -> None:
+    """Replaces a list of equal numbers; side files give one number. Raises RobotError."""
+    section, _, last = key.partition(".")
+    values = table[section].get(last)
+    if not isinstance(values, list):
+        return
+    odd = next((k for k, value in enumerate(values) if value is None or value != values[0]), 0)
+    if values[odd] is None or values[odd] != values[0]:
+        raise RobotError(
+            f"no {name}" if values[odd] is None else f"another {name}",
+            got=values[odd],
+            expected=f"{values[0]!r} as at {owners[0]!r}: all joints have the same servo, all feet "
+            "the same radius",
+            fix=f"give {key} for all in a robot file with [urdf] file",
+            where=f"{where}: joint {owners[odd]!r}",
+        )
+    table[section][last] = values[0]
+
+
+def _height(table: Table) -> float:
+    """Returns the approximate height of the hips above the feet [m]."""
+    legs = table["legs"].values()
+    return float(np.mean([_drop(leg) for leg in legs]))
+
+
+def _drop(leg: Table) -> float:
+    """Returns how far a foot is below its hip in the standing pose [m]."""
+    R, z = np.eye(3), 0.0
+    for joint in JOINT_NAMES:
+        link = leg[joint]
+        R = R @ axis_rotation(np.array(link["axis"]), link["stance"])
+        z -= float(R[2] @ [link["length"], link.get("offset_y", 0.0), link.get("offset_z", 0.0)])
+    return max(z, 1e-3)
 
 
 def assume_servo(servo: Table) -> list[str]:

@@ -9,7 +9,8 @@ controller requires, where their axes allow it. Joints with the opposite axis ar
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -217,3 +218,27 @@ def _link(
 def inertia_entries(inertia: Array) -> list[float]:
     """Returns xx yy zz xy xz yz of a symmetric matrix."""
     return [float(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+
+
+def turned_leg(leg: FoundLeg, signs: Sequence[float]) -> FoundLeg:
+    """Returns a leg with the joints of negative sign counted against the URDF's axes."""
+    other_way = [k for k, sign in enumerate(signs) if sign < 0.0]
+    table = dict(leg.table)
+    for joint in (JOINT_NAMES[k] for k in other_way):
+        link = table[joint]
+        limits = {"angle_min": -link["angle_max"], "angle_max": -link["angle_min"]}
+        table[joint] = link | {"axis": [0.0 - value for value in link["axis"]]} | limits
+    return replace(leg, table=table, reversed=(*leg.reversed, *(leg.joints[k] for k in other_way)))
+
+
+def refuse_footless(legs: list[FoundLeg], table: dict[str, Any], where: str) -> None:
+    """Raises RobotError for a leg of which no file gives the foot."""
+    for leg in legs:
+        if "length" not in table["legs"][leg.name]["tibia"]:
+            raise RobotError(
+                "a leg without a foot",
+                expected="a foot",
+                fix="give it a collision sphere where it touches the ground, or a fixed link "
+                "there; or give length and offsets under [links.tibia]",
+                where=f"{where}: link {leg.servo[2].body.name!r}",
+            )

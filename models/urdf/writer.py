@@ -11,8 +11,10 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
 from hexapod_cosim.models.arrays import Vector3
+from hexapod_cosim.models.contact.law import BodyContact
+from hexapod_cosim.models.ground.surface import Terrain
 from hexapod_cosim.models.ground.table import terrain_table
-from hexapod_cosim.models.records import JOINT_NAMES, BodyContact, Leg, Link, Robot, Terrain
+from hexapod_cosim.models.records import JOINT_NAMES, Leg, Link, Robot
 from hexapod_cosim.models.schema import specs
 from hexapod_cosim.models.urdf.elements import EXTENSION
 from hexapod_cosim.models.xml_elements import add, joined, text, written
@@ -89,10 +91,9 @@ def _joint(root: ET.Element, name: str, kind: str, parent: str, child: str) -> E
 
 def _tibia_spheres(tibia: ET.Element, link: Link, body: BodyContact) -> None:
     """Adds the spheres of knee and shank as collision shapes."""
-    for radius, share in ((body.knee_radius, 0.0), (body.shank_radius, body.shank_position)):
-        if radius > 0.0:
-            place = (share * value for value in link.tip)
-            add(_shape(tibia, "collision", place, None), "sphere", radius=radius)
+    for _, radius, share in body.tibia_spheres:
+        place = (share * value for value in link.tip)
+        add(_shape(tibia, "collision", place, None), "sphere", radius=radius)
 
 
 def _limb(root: ET.Element, name: str, link: Link, radius: float) -> ET.Element:

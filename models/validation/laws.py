@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import math
 
+from hexapod_cosim.models.contact.law import BodyContact
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.friction import LAWS, Friction
 from hexapod_cosim.models.ground.surface import LAW, Surface
 from hexapod_cosim.models.ground.valleys import tightest_valley
-from hexapod_cosim.models.records import BodyContact, Robot, Servo
+from hexapod_cosim.models.records import Robot, Servo
+from hexapod_cosim.models.servos.presets import check_constants
 
 # 1  least radius of valleys over that of a sphere in them; one nearest point needs 1, and the books
 # of energy close from 1.01 on
@@ -154,13 +156,8 @@ def check_body_contact(body: BodyContact, where: str) -> None:
 
 def check_servo(servo: Servo, at: str) -> None:
     """Checks the constants of motors and the continuous torque. Raises RobotError."""
-    for key in ("voltage", "torque_constant", "resistance"):
-        if servo.drive == "motor" and not getattr(servo, key) > 0.0:
-            what = "a motor without its constants"
-            got = getattr(servo, key)
-            expected = "a number > 0 with the drive motor"
-            fix = f"give servo.{key}, or a servo of `hexapod list servos` as servo.model"
-            raise RobotError(what, got=got, expected=expected, fix=fix, where=at + f"servo.{key}")
+    if servo.drive == "motor":
+        check_constants(vars(servo), at + "servo")
     if servo.torque_continuous > servo.torque_max:
         raise RobotError(
             "more torque for ever than at stall",

@@ -57,6 +57,19 @@ from hexapod_cosim.cosim.cli import main
         (["export", "--fmi", "7"], ["FMI version", "got 7"]),
         (["export", "--platforms", "amiga"], ["amiga"]),
         (["list", "robot"], ["'robot'", "did you mean 'robots'"]),
+        (["compare", "--seeds", "x"], ["Invalid value 'x' for '--seeds'", "compare --help"]),
+        (
+            ["simulate", "--set", "duration", "3"],
+            ["--set: not a setting", "got 'duration'", "write --set duration=VALUE"],
+        ),
+        (
+            ["simulate", "--set", "gait=ripple"],
+            ["got 'gait=ripple'", "--set gait.KEY=VALUE", "write --set gait.name=ripple"],
+        ),
+        (
+            ["simulate", "athena.fmu"],
+            ["an FMU is no scenario", "got 'athena.fmu'", "write --fmu athena.fmu"],
+        ),
     ],
 )
 def test_a_mistake_gets_one_clear_paragraph(
@@ -72,12 +85,41 @@ def test_a_mistake_gets_one_clear_paragraph(
     assert not list(tmp_path.rglob("*.fmu"))
 
 
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        (b"name = ", "1:8"),
+        (b'[gait]\nname = "ripple\n', "2:15"),
+        (b"[gait]\nperiod = [1,\n", "3:1"),
+        (b"duration = 1\nduration = 2\n", "2:13"),
+        (b"duration = 1\ntitle = '\xff'\n", "2:10"),
+    ],
+    ids=["value", "quote", "end", "twice", "encoding"],
+)
+@pytest.mark.parametrize(
+    "words", [["simulate"], ["design", "--robot"], ["simulate", "--gains"]], ids=" ".join
+)
+def test_a_broken_toml_file_is_named_with_line_and_column(
+    call: Call, tmp_path: Path, words: list[str], text: bytes, place: str
+) -> None:
+    path = tmp_path / "broken.toml"
+    path.write_bytes(text)
+    assert_refused(call(*words, path), f"{path}: not a TOML file", f"correct it at {path}:{place}")
+
+
+def test_a_command_without_its_sub_command_shows_its_help(call: Call) -> None:
+    code, out, err = call("controller")
+    assert (code, out) == (2, "")
+    assert err.startswith("Usage: hexapod controller [OPTIONS] COMMAND [ARGS]...\n")
+
+
 def test_a_file_of_another_format_is_named_with_its_format(
     call: Call, tmp_path: Path, athena_fmu: Path
 ) -> None:
     (tmp_path / "arm.xml").write_text("<mujoco/>")
     expected = "a ZIP file, such as an FMU"
-    assert_refused(call("simulate", athena_fmu), expected, "give the path of a scenario file")
+    gains = ["simulate", "--gains", athena_fmu]
+    assert_refused(call(*gains), expected, "give the path of a gains file")
     assert_refused(
         call("export", "--robot", tmp_path / "arm.xml"),
         "got 'an XML file, such as a URDF without the ending .urdf or a MuJoCo model'",

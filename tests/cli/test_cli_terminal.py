@@ -193,7 +193,7 @@ def test_json_is_all_that_is_printed(
         ),
         (["validate", "file"], ["not an FMU", "ZIP"]),
         (["simulate", "--gains", "file"], ["not a TOML file", "TOML 1.0"]),
-        (["simulate", "file"], ["not a TOML file", "correct that line"]),
+        (["simulate", "file"], ["not a TOML file", "correct it at"]),
     ],
 )
 def test_a_misuse_is_reported_in_one_paragraph_of_what_got_expected_and_fix(

@@ -10,10 +10,10 @@ import pytest
 from gains import make_gains
 
 from hexapod_cosim.controller import Gains, Gait, make_gait
-from hexapod_cosim.cosim.design.stance import StanceDesign, find_stance
+from hexapod_cosim.cosim.design.stance import StanceChange, find_stance
 from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.cosim.run import gait_selection, plant
-from hexapod_cosim.cosim.run.designs import StanceChange, designed_gains, kept_gains, kept_stance
+from hexapod_cosim.cosim.run.designs import designed_gains, kept_gains, kept_stance
 from hexapod_cosim.cosim.run.plan import chosen_gains
 from hexapod_cosim.cosim.run.plant import PlantFmus
 from hexapod_cosim.cosim.scenario.reading import load_scenario
@@ -142,9 +142,9 @@ def test_a_walk_of_an_earlier_process_is_not_designed_again(
 ) -> None:
     designs: list[str] = []
 
-    def find(robot: Robot, *, gait: Gait) -> StanceDesign:
+    def find(robot: Robot, gait: Gait) -> StanceChange:
         designs.append(gait.name)
-        return find_stance(robot, gait=gait)
+        return find_stance(robot, gait)
 
     monkeypatch.setattr(gait_selection, "find_stance", find)
     monkeypatch.setattr("hexapod_cosim.cosim.run.designs.user_cache", lambda: tmp_path)

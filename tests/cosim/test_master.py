@@ -31,8 +31,9 @@ from hexapod_cosim.cosim.results.locomotion import locomotion_of
 from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.plant import apply_settings
 from hexapod_cosim.cosim.run.single_run import simulate
+from hexapod_cosim.cosim.scenario.events import Push
 from hexapod_cosim.cosim.scenario.reading import load_scenario
-from hexapod_cosim.cosim.scenario.records import Push, Scenario
+from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.schedule import make_schedule, push_rows
 from hexapod_cosim.models import FmuError, HexapodError, load_robot
 

@@ -33,8 +33,9 @@ from hexapod_cosim.cosim.run.plan import make_plan
 from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import make_result, simulate
+from hexapod_cosim.cosim.scenario.events import Fault
 from hexapod_cosim.cosim.scenario.reading import load_scenario
-from hexapod_cosim.cosim.scenario.records import Command, Fault, Scenario
+from hexapod_cosim.cosim.scenario.records import Command, Scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import FmuError, load_robot
 

@@ -17,6 +17,7 @@ from hexapod_cosim.controller import SWITCHES, Controller, Parts, make_gait
 from hexapod_cosim.cosim.run.gait_selection import known_robot
 from hexapod_cosim.cosim.run.plan import chosen_gains
 from hexapod_cosim.cosim.scenario import list_scenarios
+from hexapod_cosim.cosim.scenario.events import Fault, Push
 from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table, scenario_robot
 from hexapod_cosim.cosim.scenario.records import Variation
 from hexapod_cosim.models import RobotError, ScenarioError, load_robot
@@ -59,7 +60,12 @@ def test_units_reach_into_commands_events_and_settings() -> None:
     assert scenario.commands[0].yaw_rate == pytest.approx(math.radians(10.0))
     assert scenario.commands[0].height == -0.005
     assert scenario.settings["terrain"]["incline"] == pytest.approx(math.radians(5.0))
-    assert (scenario.pushes[0].time, scenario.pushes[0].force) == (0.01, (1000.0, 0.0, 0.0))
+    assert (scenario.events[0].time, scenario.events[0].force) == (0.01, (1000.0, 0.0, 0.0))
+
+
+def test_soil_is_set_by_the_name_of_a_preset() -> None:
+    scenario = load_scenario("walk_flat", overrides=["soil=dry_sand"])
+    assert scenario.settings["soil"]["law"] == "bekker"
 
 
 def test_set_reaches_scenario_keys_and_hands_other_names_to_the_fmu() -> None:
@@ -181,11 +187,11 @@ EVERYTHING = [
 
 def test_faults_delays_switches_and_variations_are_read_and_written() -> None:
     scenario = load_scenario("walk_flat", overrides=EVERYTHING)
-    assert [(event.leg, event.fault, event.duration) for event in scenario.faults] == [
+    assert [(event.leg, event.fault, event.duration) for event in scenario.events_of(Fault)] == [
         ("LM", "stuck", math.inf),
         ("RF", "dead", 0.02),
     ]
-    assert [event.force for event in scenario.pushes] == [(1.0, 2.0, 3.0)]
+    assert [event.force for event in scenario.events_of(Push)] == [(1.0, 2.0, 3.0)]
     assert scenario.sensors.foot_force_delay == 0.007
     assert scenario.compliance == Parts(paper_pid=False)
     assert scenario.variation == Variation(attitude=math.radians(1.0), command_delay=0.05)

@@ -21,9 +21,9 @@ from hexapod_cosim.cosim.master.sensors import CONTACT, errors_of
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.folder import read_facts, write_result
 from hexapod_cosim.cosim.run.single_run import simulate
+from hexapod_cosim.cosim.scenario.events import describe_event, event_log
 from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table
 from hexapod_cosim.cosim.scenario.schedule import make_schedule
-from hexapod_cosim.cosim.scenario.sections import describe_event, event_log
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, ScenarioError
 
 STEPS = 10
@@ -279,7 +279,7 @@ def test_events_are_described_in_order_and_survive_a_scenario_file() -> None:
         "{time=2.6, duration=0.1, lost='command'}, {time=3.5, leg='LM', fault='stuck'}"
     )
     scenario = load_scenario("walk_flat", overrides=[f"events=[{events}]"])
-    assert [event["text"] for event in event_log(scenario, 3.2)] == [
+    assert [event["text"] for event in event_log(scenario.events, 3.2)] == [
         "the force sensor of LM reads NaN",
         "the angle sensor of LM.coxa repeats its last reading",
         "the attitude sensor reads level and at rest",

@@ -16,7 +16,7 @@ from hexapod_cosim.extensions.course import texts
 from hexapod_cosim.extensions.course.records import BY_NAME, QUANTITIES, Case, load_course
 from hexapod_cosim.extensions.course.report import COLUMNS, panels
 from hexapod_cosim.extensions.course.runs import Run, failure_of
-from hexapod_cosim.extensions.course.statistics import Rate, median_ratio, wilson
+from hexapod_cosim.extensions.course.statistics import Rate, median_ratio
 from hexapod_cosim.extensions.course.table import ALL, Table
 
 CONTROLS = ("before", "after")
@@ -184,7 +184,7 @@ def test_tables_have_a_cell_for_every_column() -> None:
 def test_wilsons_interval_solves_its_equation() -> None:
     z = 1.959963984540054  # normal quantile of 97.5 %
     for successes, runs in ((3, 10), (1, 4), (57, 60), (5, 10)):
-        found = wilson(successes, runs)
+        found = Rate(successes, runs).interval
         share = successes / runs
         assert found.value == share
         for end in (found.low, found.high):
@@ -194,7 +194,7 @@ def test_wilsons_interval_solves_its_equation() -> None:
 
 def test_no_and_all_successes_have_one_sided_intervals() -> None:
     z = 1.959963984540054
-    none, every = wilson(0, 10), wilson(10, 10)
+    none, every = Rate(0, 10).interval, Rate(10, 10).interval
     assert (none.value, none.low) == (0.0, 0.0)
     assert none.high == pytest.approx(z**2 / (10 + z**2))
     assert (every.value, every.high) == (1.0, 1.0)

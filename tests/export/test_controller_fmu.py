@@ -167,7 +167,7 @@ def test_commands_are_steps_so_derivatives_of_inputs_are_refused(fmu: Fmu) -> No
     reference = fmu.references(["command.vx"])
     with pytest.raises(Exception, match="fmi2SetRealInputDerivatives failed"):
         fmu._slave.setRealInputDerivatives(reference, [1], [0.1])
-    assert fmu._log[-1] == (
+    assert fmu.log.messages[-1] == (
         "fmi2SetRealInputDerivatives: got a call, expected none, as the model description does not "
         "offer it"
     )

@@ -19,9 +19,9 @@ from test_laws_standing import block, laid
 
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.actuator import overrun, stop_energy, stop_slopes, stop_torque
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.geometry import turning_moment, turning_slopes
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.friction import turning_moment, turning_slopes
-from hexapod_cosim.models.records import Array
 
 SAME = 1e-13  # relative: the same formula, its operations in another order
 REGULARISED = 1e-3  # relative: tanh(1e4 s/m v) is 1 to that from 0.4 mm/s on, of 0.1 m/s and more

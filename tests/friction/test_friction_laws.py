@@ -19,6 +19,7 @@ from plant import Plant, probed
 from scipy.integrate import solve_ivp
 
 from hexapod_cosim.models import load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.friction import (
     Friction,
     bristle_rate,
@@ -26,7 +27,6 @@ from hexapod_cosim.models.friction import (
     friction_force,
     friction_grip,
 )
-from hexapod_cosim.models.records import Array
 
 SAME = 1e-13  # relative: the same formula, its operations in another order
 EXACT = 1e-12  # relative: rounding

@@ -20,11 +20,11 @@ from test_twin_measure import H, stage_forces
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.models import METHODS, Leg, Link, Robot, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.geometry import foot_contacts, foot_moment, standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations, joint_overruns, stop_torques
 from hexapod_cosim.models.measure import Impulses, step_works
 from hexapod_cosim.models.method import METHOD
-from hexapod_cosim.models.records import Array
 
 MORE: dict[str, Any] = {
     "mu_static": 1.0,

@@ -14,9 +14,9 @@ from plant import Plant
 from states import changed
 
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.contact.spheres import body_contacts
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.bodies import body_contacts
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.records import Array
 
 MACRO = 0.005  # s
 UPTURNED = np.array([0.0, 1.0, 0.0, 0.0])  # turned by half a turn about x

@@ -5,6 +5,7 @@ twin, laws and closed forms.
 from __future__ import annotations
 
 import ctypes as ct
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,18 +15,20 @@ from plant import Plant, inputs, pointer
 from states import changed, distance, lopsided, random_bodies, random_command, random_pose
 
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.contact.forces import contacts_of
-from hexapod_cosim.models.contact.geometry import standing_damping
-from hexapod_cosim.models.contact.pairs import clearances, leg_points, line_distance
-from hexapod_cosim.models.contact.spheres import (
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.contact.bodies import (
     body_contacts,
-    body_forces,
     body_spheres,
+    clearances,
+    leg_points,
+    nearest_shares,
+    open_body_contact,
     standing_body_damping,
 )
+from hexapod_cosim.models.contact.forces import contacts_of
+from hexapod_cosim.models.contact.geometry import foot_force, standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.kinematics import body_states
-from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.stage import keep_slopes, solve_stage
 
 DENSE = 1e-10  # relative: the error of the dense solution, whose condition number is about 1e6
@@ -84,11 +87,19 @@ def test_accelerations_with_the_body_in_the_ground_are_those_of_the_dense_system
         assert distance(ours.multipliers, dense.multipliers) < DENSE
 
 
+def body_forces(robot: Robot, body: Array) -> Array:
+    """Returns the forces (n, 3) of the ground on all spheres at impact speed 0 [N]."""
+    smooth = replace(robot, friction=open_body_contact(robot).friction)
+    damping = standing_body_damping(robot, body)
+    contacts = zip(body_contacts(robot, body), damping, strict=True)
+    return np.array([foot_force(smooth, contact, float(d)) for contact, d in contacts])
+
+
 def test_the_outputs_are_the_forces_of_the_twin(core: ct.CDLL) -> None:
     robot = wide(lopsided(4))
     body = sprawled(robot, 4)
     output = at(core, robot, body).output(random_command(robot, 4))
-    forces = body_forces(robot, body, standing_body_damping(robot, body))
+    forces = body_forces(robot, body)
     assert len(forces) == 8 + 2 * LEGS
     assert distance(output.torso.contact_force, forces[:8].sum(axis=0)) < DENSE
     assert distance(output.body.knee_force, forces[8:14]) < DENSE
@@ -128,6 +139,12 @@ def test_an_implicit_stage_with_the_body_in_the_ground_is_the_dense_one(core: ct
 
 RING = (0, 1, 2, 5, 4, 3)  # LF LM LR RR RM RF
 SAMPLES = 61  # of each line, by brute force
+
+
+def line_distance(p: Array, a: Array, q: Array, b: Array) -> float:
+    """Returns the distance [m] between the lines p + s a and q + t b with s, t in [0, 1]."""
+    s, t = nearest_shares(p, a, q, b)
+    return float(np.linalg.norm(p - q + s * a - t * b))
 
 
 def brute_force(p: Array, a: Array, q: Array, b: Array) -> float:

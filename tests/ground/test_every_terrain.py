@@ -19,13 +19,13 @@ from states import changed
 from test_grid_motion import march, marching
 
 from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.forces import contacts_at, open_contacts
 from hexapod_cosim.models.contact.geometry import FootContact
 from hexapod_cosim.models.ground.grid_file import grid_bytes
-from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.surface import Surface, Terrain
 from hexapod_cosim.models.ground.table import CATALOGUE, make_surface
 from hexapod_cosim.models.kinematics import body_states
-from hexapod_cosim.models.records import Array, Terrain
 from hexapod_cosim.models.soil.presets import soil_preset
 
 BOOKS = 1e-4  # of the motors' gross work, at the default tolerance of 1e-4

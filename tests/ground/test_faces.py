@@ -9,9 +9,9 @@ import pytest
 from grids import BLOCKS, CORNER, NEAREST, SIDE, SMOOTH, TOP, WALL, Ground, grid_bytes, sampled
 from plant import probed
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.ground.smooth import height_and_slopes, smooth_distance
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import Array
 
 RHO = 0.3  # m, radius of the sphere that bump and bowl belong to
 

@@ -15,8 +15,8 @@ from plant import Plant, PlantError, flat
 from states import changed
 
 from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.records import Array
 
 ATHENA = load_robot("athena")
 HEIGHT = 0.2  # m, of the torso above the ground at the start

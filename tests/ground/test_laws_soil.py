@@ -15,8 +15,8 @@ from plant import Plant, PlantError, pointer
 from states import changed
 
 from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.soil import law
 from hexapod_cosim.models.soil.presets import soil_preset
 from hexapod_cosim.models.statics import standing

@@ -9,10 +9,10 @@ import pytest
 from grids import BLOCKS, CORNER, SIDE, TOP, WALL, Ground, grid_bytes
 from plant import probed
 
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.geometry import contact_shares
 from hexapod_cosim.models.ground.blocks import FACES, block_face, cell_at
 from hexapod_cosim.models.ground.surface import Surface
-from hexapod_cosim.models.records import Array
 
 RADIUS = 0.015  # m  of the foot
 CELL = 0.05  # m

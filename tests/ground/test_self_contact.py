@@ -16,19 +16,20 @@ from plant import Plant, PlantError
 from states import changed, distance, lopsided, random_command
 
 from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.contact.forces import open_contacts, pair_wrenches, standing_pairs
-from hexapod_cosim.models.contact.pairs import clearances, leg_pairs, pair_contacts
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import constraints
+from hexapod_cosim.models.contact.bodies import clearances, leg_pairs, pair_contacts, standing_pairs
+from hexapod_cosim.models.contact.forces import open_contacts, pair_wrenches
 from hexapod_cosim.models.dynamics import (
     Command,
     accelerations,
-    constraints,
     mass_matrix,
     masses,
     world_inertias,
 )
-from hexapod_cosim.models.integrator import integrate, start_state
+from hexapod_cosim.models.integrator import integrate
 from hexapod_cosim.models.kinematics import body_states
-from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.step import start_state
 
 DENSE = 1e-10  # relative: the error of the dense solution, whose condition number is about 1e6
 FORCES = 1e-12  # relative: rounding of forces

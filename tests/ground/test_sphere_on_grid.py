@@ -19,9 +19,9 @@ from plant import Plant
 from states import changed, scaled
 
 from hexapod_cosim.models import CONTACT_LAWS, Leg, Link, Robot, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.law import CHI, achieved_restitution
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.records import Array
 
 RADIUS = 0.02  # m  of the sphere
 BOWL = 0.25  # m  radius of the bowl

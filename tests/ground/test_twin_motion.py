@@ -21,16 +21,17 @@ from states import changed
 from test_laws_soil import footprints
 
 from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.ground.grid_file import grid_bytes
 from hexapod_cosim.models.ground.patches import material_row
-from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.surface import Surface, Terrain
 from hexapod_cosim.models.ground.table import make_surface
-from hexapod_cosim.models.integrator import State, integrate, start_state
+from hexapod_cosim.models.integrator import integrate
 from hexapod_cosim.models.kinematics import body_states, foot_centres
-from hexapod_cosim.models.records import Array, Terrain
 from hexapod_cosim.models.soil.presets import soil_preset
 from hexapod_cosim.models.statics import standing
+from hexapod_cosim.models.step import State, start_state
 
 MACRO = 0.005  # s
 PLACES = 1e-13  # m, 1: some hundreds of roundings, which impacts enlarge

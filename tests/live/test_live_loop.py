@@ -26,7 +26,7 @@ from hexapod_cosim.extensions.live.messages import (
 from hexapod_cosim.extensions.live.robot import LiveRobot
 from hexapod_cosim.extensions.live.settings import Choices, control_texts
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.schema import parse_toml
+from hexapod_cosim.models.files import parse_toml
 
 FORWARD = Drive(forward=1.0, speed=0.3)
 

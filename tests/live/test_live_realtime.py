@@ -184,3 +184,5 @@ def test_realtime_designs_gains_for_the_walk_that_it_measures(
 def test_a_port_out_of_range_is_refused(call: Call) -> None:
     words = ["--no-browser", "--port", "99999"]
     assert_refused(call("live", *words), "got 99999", "from 1 to 65535")
+    words[words.index("99999")] = "abc"
+    assert_refused(call("live", *words), "Invalid value 'abc' for '--port'", "live --help")

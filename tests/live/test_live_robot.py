@@ -18,6 +18,7 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.run.plan import RunPlan, chosen_gains
 from hexapod_cosim.cosim.run.plant import initialise_plant
 from hexapod_cosim.cosim.run.runner import Runner
+from hexapod_cosim.cosim.scenario.events import Push, ServoFault
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Command
@@ -33,7 +34,7 @@ from hexapod_cosim.extensions.live.settings import (
     live_scenario,
 )
 from hexapod_cosim.models import HexapodError, load_robot
-from hexapod_cosim.models.schema import parse_toml
+from hexapod_cosim.models.files import parse_toml
 
 WALK, STAND = BodyCommand(vx=0.08), BodyCommand()
 ANGLES = joint_names("angle_ref")
@@ -217,10 +218,10 @@ def test_a_recording_with_a_push_and_a_limp_leg_is_the_same_walk(placed: LiveRob
         recording.note(command, force, placed.limp)
         placed.step(command, force)
     scenario = scenario_from_table(parse_toml(recording.as_toml()), where="driven.toml")
-    assert [(one.leg, one.fault) for one in scenario.servo_faults] == [("RM", "limp")]
+    assert [(one.leg, one.fault) for one in scenario.events_of(ServoFault)] == [("RM", "limp")]
     assert scenario.duration == pytest.approx(300 * 0.005)
     assert len(scenario.commands) == 3
-    assert [push.force for push in scenario.pushes] == [(0.0, 3.0, 1.0)]
+    assert [push.force for push in scenario.events_of(Push)] == [(0.0, 3.0, 1.0)]
     with Runner(everything=True) as runner:
         walked = runner.simulate(scenario).outcome.recording
     # the push is a mean over a macro-step, whose times are rounded

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.models import Link, Robot, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.kinematics import inertia_matrix
-from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES, Array
+from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES
 
 
 def random_robot(seed: int, *, pattern: bool) -> Robot:

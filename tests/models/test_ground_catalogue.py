@@ -24,9 +24,8 @@ from hexapod_cosim.models.ground.grid_file import (
     write_grid,
 )
 from hexapod_cosim.models.ground.smooth import height_and_slopes, heights_at
-from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.surface import Surface, Terrain
 from hexapod_cosim.models.ground.table import CATALOGUE, make_surface, merged_terrain, terrain_table
-from hexapod_cosim.models.records import Terrain
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
 MADE = [name for name in CATALOGUE if name != "heightfield"]

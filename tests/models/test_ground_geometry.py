@@ -13,14 +13,15 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.models import load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.ground.faces import ground, ground_height
 from hexapod_cosim.models.ground.smooth import height_and_slopes
-from hexapod_cosim.models.ground.surface import Surface
+from hexapod_cosim.models.ground.surface import Surface, Terrain
 from hexapod_cosim.models.ground.table import make_surface
 from hexapod_cosim.models.ground.valleys import Valley, tightest_valley
 from hexapod_cosim.models.kinematics import body_states
-from hexapod_cosim.models.records import Array, Robot, Terrain
+from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.statics import standing
 from hexapod_cosim.models.validation.bodies import check_settings
 

@@ -11,10 +11,10 @@ import pytest
 from PIL import Image
 
 from hexapod_cosim.models import RobotError, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.ground.surface import Surface
 from hexapod_cosim.models.ground.table import make_surface
 from hexapod_cosim.models.ground.valleys import tightest_valley
-from hexapod_cosim.models.records import Array
 
 ATHENA = Path(__file__).resolve().parents[2] / "models" / "athena.toml"
 SCALES = {"horizontal_scale": 0.1, "vertical_scale": 0.001}

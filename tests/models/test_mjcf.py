@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.models import Robot, RobotError, Terrain, load_robot
+from hexapod_cosim.models.energy import joint_mobility
 from hexapod_cosim.models.ground.table import make_surface
-from hexapod_cosim.models.mjcf import joint_mobility, robot_to_mjcf
+from hexapod_cosim.models.mjcf import robot_to_mjcf
 
 STIFFNESS, DAMPING = 344.0, 2.0  # N m/rad, N m s/rad
 # 1  the impedance of a stop: the share of its torque that depends on the joint's acceleration

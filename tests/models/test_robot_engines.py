@@ -15,11 +15,13 @@ from foreign_urdf import spider_urdf
 
 from hexapod_cosim.cosim.cli.exporting import FORMATS, export_description
 from hexapod_cosim.models import LEG_NAMES, Robot, foot_positions, list_robots, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.dynamics import mass_matrix, masses
+from hexapod_cosim.models.energy import tibia_mobility
 from hexapod_cosim.models.ground.faces import ground_normal
 from hexapod_cosim.models.kinematics import body_states, rotation_matrix
-from hexapod_cosim.models.mjcf import robot_to_mjcf, tibia_mobility
-from hexapod_cosim.models.records import JOINT_NAMES, Array
+from hexapod_cosim.models.mjcf import robot_to_mjcf
+from hexapod_cosim.models.records import JOINT_NAMES
 from hexapod_cosim.models.servos.motor import back_emf_damping
 from hexapod_cosim.models.statics import settled
 from hexapod_cosim.models.urdf.writer import robot_to_urdf

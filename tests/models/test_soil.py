@@ -12,7 +12,7 @@ import pytest
 
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.errors import RobotError
-from hexapod_cosim.models.records import Foot, Soil
+from hexapod_cosim.models.records import Foot
 from hexapod_cosim.models.soil.law import (
     elastic_force,
     plastic_depth,
@@ -28,7 +28,7 @@ from hexapod_cosim.models.soil.law import (
     virgin_force,
     virgin_slope,
 )
-from hexapod_cosim.models.soil.presets import soil_preset, soil_table
+from hexapod_cosim.models.soil.presets import Soil, soil_preset, soil_table
 
 SPHERE = load_robot("athena").foot  # R = 15 mm
 TRIPOD = 18.3  # N  load of a foot of a tripod

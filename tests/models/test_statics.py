@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.models import Robot, RobotError, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.geometry import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.kinematics import body_states
-from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.statics import Standing, settled, standing
 
 # m/s2 and rad/s2: forces that balance to 1e-9 N accelerate the smallest inertias less than that

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import constraints, joint_reactions
 from hexapod_cosim.models.dynamics import (
     Command,
     accelerations,
     applied_forces,
-    constraints,
     drive_acceleration,
-    joint_reactions,
     masses,
     world_inertias,
 )
@@ -28,7 +28,6 @@ from hexapod_cosim.models.kinematics import (
     quaternion_product,
     rotation_matrix,
 )
-from hexapod_cosim.models.records import Array
 
 EXACT = 1e-12  # relative to the size of the compared quantities: about 1e3 roundings
 DIFFERENCE = 1e-6  # s, of central differences, whose error is about 1e-8 of the third derivative

@@ -15,20 +15,14 @@ from states import changed, distance, landing, lopsided, random_bodies, random_c
 
 from hexapod_cosim.models import METHODS, Robot, load_robot
 from hexapod_cosim.models.actuator import servo_slopes
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import project
 from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.integrator import (
-    State,
-    cubic_crossing,
-    error_norm,
-    integrate,
-    project,
-    start_state,
-    step_factor,
-)
+from hexapod_cosim.models.integrator import cubic_crossing, integrate, step_factor
 from hexapod_cosim.models.kinematics import body_states, joint_angles, joint_speeds
 from hexapod_cosim.models.method import METHOD, Stage, method_step
-from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.step import State, error_norm, start_state
 
 PLACES = 1e-14  # m, 1: some tens of roundings
 SPEEDS = 1e-11  # relative to the largest speed: the dense system of 204 unknowns loses four digits

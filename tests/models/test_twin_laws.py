@@ -10,6 +10,7 @@ import pytest
 
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.actuator import servo_torque
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.law import (
     CHI,
     achieved_restitution,
@@ -19,7 +20,6 @@ from hexapod_cosim.models.contact.law import (
 )
 from hexapod_cosim.models.friction import friction_force
 from hexapod_cosim.models.ground.faces import ground
-from hexapod_cosim.models.records import Array
 
 EXACT = 1e-12  # relative: about 1e3 roundings
 FIGURES = 1e-4  # of figures that are printed with four to six digits

@@ -15,6 +15,7 @@ from test_laws_impact import above
 
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force, standing_damping
 from hexapod_cosim.models.contact.law import contact_damping
 from hexapod_cosim.models.dynamics import Command
@@ -27,7 +28,6 @@ from hexapod_cosim.models.measure import (
     step_works,
 )
 from hexapod_cosim.models.method import METHOD
-from hexapod_cosim.models.records import Array
 
 H = 2e-4  # s
 SAME = 1e-9  # relative: differences of depths and angles over a step lose some digits

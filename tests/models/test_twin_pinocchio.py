@@ -12,8 +12,10 @@ import pinocchio as pin
 import pytest
 
 from hexapod_cosim.models import LEG_NAMES, Robot, load_robot
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import constraints
 from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force
-from hexapod_cosim.models.dynamics import Command, accelerations, constraints, joint_torques
+from hexapod_cosim.models.dynamics import Command, accelerations, joint_torques
 from hexapod_cosim.models.energy import kinetic_energy
 from hexapod_cosim.models.kinematics import (
     body_states,
@@ -22,7 +24,6 @@ from hexapod_cosim.models.kinematics import (
     joint_speeds,
     rotation_matrix,
 )
-from hexapod_cosim.models.records import Array
 
 # relative to the largest entry: about 1e3 times the rounding of the two algorithms
 AGREEMENT = 1e-11

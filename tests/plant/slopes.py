@@ -13,13 +13,15 @@ import numpy as np
 from plant import Plant, inputs, pointer
 
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import constraints
 from hexapod_cosim.models.contact.geometry import (
     foot_contact,
     foot_contacts,
     foot_force,
     standing_damping,
 )
-from hexapod_cosim.models.dynamics import Command, constraints, joint_torques
+from hexapod_cosim.models.dynamics import Command, joint_torques
 from hexapod_cosim.models.kinematics import (
     body_states,
     cross,
@@ -29,7 +31,6 @@ from hexapod_cosim.models.kinematics import (
     rotation_matrix,
     skew,
 )
-from hexapod_cosim.models.records import Array
 
 STEP = 1e-7  # step of the central differences in m, rad, m/s
 

@@ -13,9 +13,9 @@ from plant import Plant
 from states import changed, landing, random_command, random_pose, with_links
 
 from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.energy import kinetic_energy, momentum
-from hexapod_cosim.models.records import Array
 
 # relative, for each quantity: rounding of sums of 19 terms over some hundred steps
 ROUNDING = 1e-13

@@ -15,11 +15,11 @@ from plant import Plant
 from states import changed, landing, random_command
 
 from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.energy import centre_of_mass
 from hexapod_cosim.models.kinematics import body_states, rotation_matrix
-from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.statics import standing
 
 AT_REST = 1e-9  # relative, m, m/s and m/s2: the forces of the settled pose balance to 1e-9 N

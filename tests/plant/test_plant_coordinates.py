@@ -13,9 +13,9 @@ from plant import Plant, flat, inputs
 from states import changed, lopsided, random_command, random_pose
 
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.kinematics import body_states
-from hexapod_cosim.models.records import Array
 
 SIZE, INPUTS = ct.sizeof(HxCoordinates) // 8, ct.sizeof(HxInput) // 8
 CONTACT = slice(

@@ -16,11 +16,12 @@ from slopes import resting, slopes
 from states import changed, distance, lopsided, random_bodies, random_command
 
 from hexapod_cosim.models import CONTACT_LAWS, Robot, load_robot
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import constraints
 from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force, standing_damping
 from hexapod_cosim.models.contact.law import contact_damping
-from hexapod_cosim.models.dynamics import Command, accelerations, constraints, mass_matrix
+from hexapod_cosim.models.dynamics import Command, accelerations, mass_matrix
 from hexapod_cosim.models.kinematics import quaternion_rate, skew
-from hexapod_cosim.models.records import Array
 
 DENSE = 1e-10  # relative: the error of the dense solution, whose condition number is about 1e6
 MODES = ("position", "torque", "kinematic")

@@ -11,8 +11,10 @@ from states import changed, distance, lopsided, random_bodies
 
 from hexapod_cosim.models import CONTACT_LAWS, Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import joint_kinematics
 from hexapod_cosim.models.contact.law import contact_damping, exact_restitution_chi, normal_force
-from hexapod_cosim.models.dynamics import joint_kinematics, world_inertias
+from hexapod_cosim.models.dynamics import world_inertias
 from hexapod_cosim.models.kinematics import (
     body_states,
     joint_angle,
@@ -21,7 +23,6 @@ from hexapod_cosim.models.kinematics import (
     rotation_matrix,
     skew,
 )
-from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.servos.motor import Power
 
 # relative: the same formula with its operations in another order, some hundred roundings

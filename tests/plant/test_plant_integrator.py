@@ -16,10 +16,10 @@ from plant import Plant, PlantError, inputs, probed
 from states import changed, random_command
 
 from hexapod_cosim.models import METHODS, Robot, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.kinematics import body_states
-from hexapod_cosim.models.records import Array
 
 ORDER = {"rosw3": 3, "ros2": 2, "dp54": 5}
 SLOPE = 0.1  # difference of the regression's order from the method's order

@@ -19,7 +19,7 @@ from plant import Plant, pointer
 from states import changed, random_command, random_pose
 
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.soil.presets import soil_preset
 
 SLOTS = 8

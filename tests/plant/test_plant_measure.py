@@ -20,8 +20,8 @@ from test_laws_impact import above, falling, flown_off, rigid
 from test_long_walk import standing, walking
 
 from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.records import Array
 
 G = 9.81  # m/s2
 SUMS = 1e-9  # J: what another order of summation may change

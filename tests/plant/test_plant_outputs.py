@@ -16,11 +16,11 @@ from plant import Plant, bound, definition, seen
 from states import changed, distance, lopsided, random_bodies, random_command
 
 from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.constraints import constraint_errors, joint_reactions
 from hexapod_cosim.models.contact.geometry import foot_contacts
-from hexapod_cosim.models.dynamics import joint_reactions
-from hexapod_cosim.models.energy import constraint_errors, kinetic_energy, potential_energy
+from hexapod_cosim.models.energy import kinetic_energy, potential_energy
 from hexapod_cosim.models.kinematics import rotation_matrix
-from hexapod_cosim.models.records import Array
 
 # relative: the same formula with its operations in another order, some hundred roundings
 SAME = 1e-13

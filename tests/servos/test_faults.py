@@ -17,8 +17,9 @@ from hexapod_cosim.cosim.scenario.schedule import make_schedule
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.actuator import lock_joints
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.integrator import integrate, start_state
+from hexapod_cosim.models.integrator import integrate
 from hexapod_cosim.models.servos.motor import Power, stall_torque
+from hexapod_cosim.models.step import start_state
 
 RESIDUAL = 1e-4  # relative to what motors and pushes give and losses take
 H = 1e-3  # s

@@ -22,18 +22,13 @@ from hexapod_cosim.cosim.design.standing import rest
 from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_robot
 from hexapod_cosim.models import Robot, RobotError, ScenarioError, load_robot, robot_from_table
 from hexapod_cosim.models.actuator import servo_slopes, servo_torque
+from hexapod_cosim.models.constraints import constraints
 from hexapod_cosim.models.contact.geometry import standing_damping
-from hexapod_cosim.models.dynamics import (
-    Command,
-    accelerations,
-    applied_forces,
-    constraints,
-    external_torques,
-)
-from hexapod_cosim.models.integrator import Start, start_state, try_step
+from hexapod_cosim.models.dynamics import Command, accelerations, applied_forces, external_torques
+from hexapod_cosim.models.files import parse_toml
 from hexapod_cosim.models.kinematics import body_states, joint_models
 from hexapod_cosim.models.records import Servo
-from hexapod_cosim.models.schema import parse_toml, require
+from hexapod_cosim.models.schema import require
 from hexapod_cosim.models.servos.motor import (
     Power,
     electrical_power,
@@ -43,6 +38,7 @@ from hexapod_cosim.models.servos.motor import (
     motor_torque,
 )
 from hexapod_cosim.models.servos.presets import measured_servo, servo_table
+from hexapod_cosim.models.step import Start, start_state, try_step
 
 # relative, and N m or N m s: the same formulas; powers and exponentials of different libraries, and
 # 1 - tanh^2 of a saturated friction times a slope of 70 N m s

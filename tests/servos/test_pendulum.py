@@ -18,8 +18,9 @@ from states import with_links
 from test_laws_servo import HEAVY, tibias, walled
 
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.records import Array, Servo
+from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.schema import require
 from hexapod_cosim.models.servos.presets import measured_servo, servo_table
 

@@ -16,12 +16,13 @@ from test_laws_servo import WEIGHTLESS
 from test_measured_servos import with_servo
 
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.geometry import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations, joint_torques, world_inertias
 from hexapod_cosim.models.energy import kinetic_energy, momentum
-from hexapod_cosim.models.integrator import Start, end_step, start_state, try_step
+from hexapod_cosim.models.integrator import end_step
 from hexapod_cosim.models.kinematics import joint_models, joint_speeds, rotation_matrix
-from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.step import Start, start_state, try_step
 
 RATIO = -40.0  # few turns, so that the effect is large
 SAME = 1e-9  # relative, of sums over bodies, and of the sweeps and the dense system

@@ -16,9 +16,9 @@ from plant import pointer
 from scipy.integrate import quad
 
 from hexapod_cosim.models import SOIL_LAWS, load_robot
-from hexapod_cosim.models.records import Foot, Soil
+from hexapod_cosim.models.records import Foot
 from hexapod_cosim.models.soil import law
-from hexapod_cosim.models.soil.presets import list_soils, soil_preset
+from hexapod_cosim.models.soil.presets import Soil, list_soils, soil_preset
 
 EXACT = 1e-14  # relative
 SLOPE = 1e-13  # relative: below its equator a sphere's slope is a difference of similar terms

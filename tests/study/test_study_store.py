@@ -34,9 +34,10 @@ from studies import (
 )
 from study_runners import Counting, Slow
 
+from hexapod_cosim.cosim.results.folder import locked
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.extensions.study import store as store_module
-from hexapod_cosim.extensions.study.folder import MANIFEST, RESULTS, export_runs, locked
+from hexapod_cosim.extensions.study.folder import MANIFEST, RESULTS, export_runs
 from hexapod_cosim.extensions.study.reading import load_study, study_from_table
 from hexapod_cosim.extensions.study.records import StudyError
 from hexapod_cosim.extensions.study.run import Options, run_study
@@ -209,7 +210,7 @@ def test_two_processes_do_not_share_a_folder(small: Callable[..., Any], tmp_path
     small()
     with (
         locked(tmp_path / "out"),
-        pytest.raises(StudyError, match="another process runs a study into this folder"),
+        pytest.raises(HexapodError, match="another process writes its results into this folder"),
     ):
         small()
 

@@ -12,7 +12,7 @@ from mirror import MESSAGE_SIZE
 from plant import Plant, bound, definition, probed
 
 from hexapod_cosim.models import Robot
-from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.arrays import Array
 
 SMOOTH, BLOCKS = 1, 2
 TOP, WALL, SIDE, CORNER, NEAREST = range(5)

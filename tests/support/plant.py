@@ -41,8 +41,8 @@ from hexapod_cosim.models import (
     Link,
     Robot,
 )
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.dynamics import Accelerations, Command
-from hexapod_cosim.models.records import Array
 
 
 class PlantError(Exception):

@@ -12,11 +12,11 @@ from plant import Plant
 from scaled_robots import scaled_part
 
 from hexapod_cosim.models import BodyContact, Leg, Link, Robot, load_robot
+from hexapod_cosim.models.arrays import Array, Vector6
 from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.ground.faces import ground_normal
 from hexapod_cosim.models.kinematics import body_states
-from hexapod_cosim.models.records import Array, Vector6
 
 LEGS, JOINTS = 6, 3
 MACRO = 0.004  # s, macro-step of a trail

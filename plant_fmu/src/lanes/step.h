@@ -1,4 +1,4 @@
-/* step.h - one step of a method from a start, and its error (eq. 19 to 22); models/integrator.py
+/* step.h - one step of a method from a start, and its error (eq. 19 to 22); models/step.py
  * and models/stage.py are the readable form */
 #ifndef HX_STEP_H
 #define HX_STEP_H

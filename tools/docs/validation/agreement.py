@@ -11,8 +11,9 @@ from test_plant_dynamics import MODES, ROBOTS, at
 from test_twin_pinocchio import pinocchio_accelerations
 
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.constraints import constraints
 from hexapod_cosim.models.contact.geometry import standing_damping
-from hexapod_cosim.models.dynamics import accelerations, constraints, joint_torques
+from hexapod_cosim.models.dynamics import accelerations, joint_torques
 from tools.docs.validation.shown import Shown, short
 
 SEEDS = range(8)
