@@ -40,6 +40,8 @@ def gait_without(gait: Gait, absent: Mask, *, backwards: bool) -> Gait:
         order.reverse()
     count, offsets = len(order), np.zeros(LEGS)
     offsets[order] = -np.arange(count) / count % 1.0
+    # an absent leg gives up its load while it stands by the clock: the one opposite it steps first
+    offsets[absent] = (offsets[::-1][absent] + 0.5) % 1.0
     swing = SWIFT * gait.period * (1.0 - gait.duty)
     return Gait(
         name=gait.name,

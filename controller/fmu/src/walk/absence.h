@@ -51,6 +51,13 @@ HX_SELDOM static void hx_gait_without(hxGait *gait, const int absent[HX_LEGS], i
       place += !absent[k] && (backwards ? phase[k] < phase[leg] : phase[k] > phase[leg]);
     gait->offset[leg] = absent[leg] || place == 0 ? 0.0 : 1.0 - (double)place / count;
   }
+  /* an absent leg gives up its load while it stands by the clock: the one opposite it steps first
+   */
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const int opposite = HX_LEGS - 1 - leg;
+    const double phase_of_it = absent[opposite] ? 0.0 : gait->offset[opposite];
+    if (absent[leg]) gait->offset[leg] = hx_fraction(phase_of_it + 0.5);
+  }
   const double swing = swift * gait->period * (1.0 - gait->duty);
   gait->pattern = HX_PATTERN_CUSTOM;
   gait->period = count * swing;
