@@ -17,7 +17,7 @@ import numpy as np
 from hexapod_cosim.controller.comply.compliant import Compliant, PresentStep
 from hexapod_cosim.controller.gains import Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, cis, rows_of
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, rows_of
 from hexapod_cosim.controller.planned_step import PlannedStep, StepPlanner
 from hexapod_cosim.controller.signals import JointCommand
 from hexapod_cosim.controller.walk.absence import Absence
@@ -55,15 +55,11 @@ class WalkPlan(Stateful):
         """Plans to stand. Constants depend on the gait; period: of the controller [s]."""
         self.legs, self.period, self.laws = legs, period, laws
         self.ramp = CommandRamp(gait.period, period=period)
-        home = legs.forward(legs.stance)
-        inward = -gait.narrowing * cis(legs.hip_yaw + legs.stance[:, 0])
-        narrow = legs.pose(home[:, 0] + 1j * home[:, 1] + inward, home[:, 2])
-        turned = legs.rolling(narrow.angle)
-        self.paths = FootPaths(gait, home, period=period, inward=inward, turned=turned)
+        self.paths = FootPaths(gait, legs, period=period)
         self.pace = Pace(gait, legs, self.paths.home_height)
         if laws is not None:
             self.paths.clock.handover = laws.support.handover
-        handover = 0.0 if laws is None else laws.support.handover * gait.period
+        handover = self.paths.clock.handover * gait.period  # s
         self.absence = Absence(legs, self.paths.home, handover=handover, period=period)
         self.planner = StepPlanner(parts, legs=legs, laws=laws)
         self.now: PlannedStep
@@ -134,12 +130,9 @@ class WalkPlan(Stateful):
             paths.narrowing = laws.adaptation.narrowing
 
     def _waits(self) -> bool:
-        """Returns whether the gait clock waits for feet at the ends of their swings (C50).
-
-        It does not without a leg, because a foot may then have no load to carry.
-        """
+        """Returns whether the gait clock waits for feet at the ends of their swings (C50)."""
         clock = self.paths.clock
-        if self.laws is None or clock.absent.any():
+        if self.laws is None or clock.absent.any():  # without a leg, a foot may have no load
             return False
         return self.laws.laws.waits(clock.landing(self.at), waiting=clock.waiting)
 
@@ -245,10 +238,7 @@ class WalkPlan(Stateful):
         return (getattr(self.after, name) - before) / (2.0 * self.period)
 
     def centres(self) -> Array:
-        """Returns the planned centres of the feet (6, 3), torso frame [m].
-
-        They are those of the paths with the shift due to rolling, without the lowering.
-        """
+        """Returns the planned centres of the feet (6, 3), rolling, not lowered, torso frame [m]."""
         now = self.now
         plane, height = now.posture.see_place(now.plane + now.shift, now.feet.height)
         return rows_of(plane.real, plane.imag, height)
@@ -294,15 +284,8 @@ class WalkPlan(Stateful):
         laws, now, clock = self.laws, self.now, self.paths.clock
         assert laws is not None
         demand = laws.dynamics.demand(self.motion(), speed, now.posture, self.planner.laden())
-        load = laws.plan(
-            demand,
-            now.activation,
-            feet=now.plane + now.shift,
-            height=self.lift(),
-            rise=now.feet.rise,
-            swinging=clock.swinging,
-            awaited=clock.awaited,
-        )
+        feet, height, rise = now.plane + now.shift, self.lift(), now.feet.rise
+        load = laws.plan(demand, now.activation, clock, feet=feet, height=height, rise=rise)
         return PresentStep(
             load=load,
             climb=self.legs.speeds(now.pose, 0.0, 1.0),
