@@ -197,7 +197,11 @@ def test_an_unexpected_error_is_one_line_with_a_hint(
         (
             ["simulate", "--speed", "3"],
             2,
-            {"what": "not understood", "got": "No such option: --speed (Possible options: --set)"},
+            {
+                "what": "not understood",
+                "got": "No such option: --speed (Possible options: --set)",
+                "fix": "write --set command.vx=0.12; `hexapod simulate --help` explains it",
+            },
         ),
         (
             ["compare", "--seeds", "0"],
