@@ -60,7 +60,7 @@ from hexapod_cosim.cosim.cli import main
         (["compare", "--seeds", "x"], ["Invalid value 'x' for '--seeds'", "compare --help"]),
         (
             ["simulate", "--set", "duration", "3"],
-            ["--set: not a setting", "got 'duration'", "write --set duration=VALUE"],
+            ["--set: not a setting", "got 'duration'", "write duration=VALUE"],
         ),
         (
             ["simulate", "--set", "gait=ripple"],
