@@ -87,7 +87,7 @@ class Controller(Stateful):
             self.paper = Paper(robot, gait, gains, parts, legs=legs, period=period)
         elif gains is not None:
             self.compliant = Compliant(robot, gait, gains, parts, legs=legs, period=period)
-        self.plan = WalkPlan(gait, parts, legs=legs, period=period, laws=self.compliant)
+        self.plan = WalkPlan(gait, parts, legs=legs, period=period, compliant=self.compliant)
 
     # -------------------------------------------------------------- change of gait and control
 

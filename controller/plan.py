@@ -44,24 +44,30 @@ class WalkPlan(Stateful):
         cut: the present step is the last of its section.
         before, now, after: the step before the present one, this one and the next one. None: there
             is none in the section.
-        laws: compliant control, on which the plan depends; None: none.
+        compliant: compliant control, on which the plan depends; None: none.
     """
 
     STATE = ("pace", "ramp", "paths", "at", "last", "cut", "before", "now", "after", "absence")
 
     def __init__(
-        self, gait: Gait, parts: Parts, *, legs: LegSolver, period: float, laws: Compliant | None
+        self,
+        gait: Gait,
+        parts: Parts,
+        *,
+        legs: LegSolver,
+        period: float,
+        compliant: Compliant | None,
     ) -> None:
         """Plans to stand. Constants depend on the gait; period: of the controller [s]."""
-        self.legs, self.period, self.laws = legs, period, laws
+        self.legs, self.period, self.compliant = legs, period, compliant
         self.ramp = CommandRamp(gait.period, period=period)
         self.paths = FootPaths(gait, legs, period=period)
         self.pace = Pace(gait, legs, self.paths.home_height)
-        if laws is not None:
-            self.paths.clock.handover = laws.support.handover
+        if compliant is not None:
+            self.paths.clock.handover = compliant.support.handover
         handover = self.paths.clock.handover * gait.period  # s
         self.absence = Absence(legs, self.paths.home, handover=handover, period=period)
-        self.planner = StepPlanner(parts, legs=legs, laws=laws)
+        self.planner = StepPlanner(parts, legs=legs, compliant=compliant)
         self.now: PlannedStep
         self.reset()
 
@@ -106,8 +112,8 @@ class WalkPlan(Stateful):
             value = value + np.array([drift.real, drift.imag, 0.0, 0.0, 0.0, 0.0])
         vx, vy, yaw_rate = value[:3].tolist()
         twist = Twist(complex(vx, vy), yaw_rate)
-        if self.laws is not None:
-            added = self.laws.addition(number)
+        if self.compliant is not None:
+            added = self.compliant.addition(number)
             twist = Twist(twist.velocity + added.velocity, twist.yaw_rate + added.yaw_rate)
         return value, Posture.of(value[3:], rate[3:]), twist
 
@@ -119,31 +125,28 @@ class WalkPlan(Stateful):
 
     # --------------------------------------------------------------------------------- sections
 
-    def _follow_sensors(self, laws: Compliant) -> None:
+    def _follow_sensors(self, compliant: Compliant) -> None:
         """Notes which feet have met the ground on their way down (C51), and narrows the stance.
 
         The steps of a commanded motion aim at the stance that the weight asks for (C53).
         """
         paths = self.paths
-        paths.met = paths.clock.swinging & (self.now.feet.rise < 0.0) & laws.laws.meets()
+        paths.met = paths.clock.swinging & (self.now.feet.rise < 0.0) & compliant.laws.meets()
         if self.ramp.moves():
-            paths.narrowing = laws.adaptation.narrowing
+            paths.narrowing = compliant.adaptation.narrowing
 
     def _waits(self) -> bool:
         """Returns whether the gait clock waits for feet at the ends of their swings (C50)."""
         clock = self.paths.clock
-        if self.laws is None or clock.absent.any():  # without a leg, a foot may have no load
+        if self.compliant is None or clock.absent.any():  # without a leg, a foot may have no load
             return False
-        return self.laws.laws.waits(clock.landing(self.at), waiting=clock.waiting)
+        return self.compliant.laws.waits(clock.landing(self.at), waiting=clock.waiting)
 
     def _plan_afresh(self, *, waiting: bool) -> None:
-        """Begins a new section at the present step, and plans the step after it.
-
-        waiting: the gait clock stands still in it.
-        """
+        """Begins a section now, where the clock may be waiting, and plans the step after it."""
         moves, settled = self.ramp.moves(), self.ramp.settled()
-        if self.laws is not None:
-            self.laws.steer(self.at, moves=moves, afresh=self.cut)
+        if self.compliant is not None:
+            self.compliant.steer(self.at, moves=moves, afresh=self.cut)
         value, posture, twist = self._look_ahead(0, 0)
         going = moves or not settled
         if waiting:
@@ -161,8 +164,8 @@ class WalkPlan(Stateful):
         command_changed: the plan no longer applies, and a new section begins.
         """
         due, clock = command_changed or self.after is None, self.paths.clock
-        if self.laws is not None:
-            self._follow_sensors(self.laws)
+        if self.compliant is not None:
+            self._follow_sensors(self.compliant)
         if due or clock.waiting:
             waiting = self._waits()
             if due or not waiting:
@@ -222,7 +225,7 @@ class WalkPlan(Stateful):
         """Goes on in the phase of the plan under another control, in the same gait."""
         self.restore(before.save())
         self.paths.met = NO_LEG
-        if self.laws is None:
+        if self.compliant is None:
             self.paths.narrowing = 0.0
         self.after, self.cut = None, True
 
@@ -240,13 +243,13 @@ class WalkPlan(Stateful):
     def centres(self) -> Array:
         """Returns the planned centres of the feet (6, 3), rolling, not lowered, torso frame [m]."""
         now = self.now
-        plane, height = now.posture.see_place(now.plane + now.shift, now.feet.height)
+        plane, height = now.posture.to_torso(now.plane + now.shift, now.feet.height)
         return rows_of(plane.real, plane.imag, height)
 
     def feet(self) -> Feet:
         """Returns the feet of the present step with rolling and lowering, torso frame."""
         now = self.now
-        return now.posture.see(
+        return now.posture.feet_to_torso(
             Feet(
                 plane=now.plane + now.shift,
                 height=now.height,
@@ -277,15 +280,12 @@ class WalkPlan(Stateful):
         )
 
     def present_step(self, speed: Array) -> PresentStep:
-        """Returns planned loads and geometry of the present step for the laws (C15 to C20).
-
-        speed: (6, 3) of the joints [rad/s].
-        """
-        laws, now, clock = self.laws, self.now, self.paths.clock
-        assert laws is not None
-        demand = laws.dynamics.demand(self.motion(), speed, now.posture, self.planner.laden())
+        """Returns loads and geometry at joint speeds (6, 3) [rad/s] for the laws (C15 to C20)."""
+        compliant, now, clock = self.compliant, self.now, self.paths.clock
+        assert compliant is not None
+        demand = compliant.dynamics.demand(self.motion(), speed, now.posture, self.planner.laden())
         feet, height, rise = now.plane + now.shift, self.lift(), now.feet.rise
-        load = laws.plan(demand, now.activation, clock, feet=feet, height=height, rise=rise)
+        load = compliant.plan(demand, now.activation, clock, feet=feet, height=height, rise=rise)
         return PresentStep(
             load=load,
             climb=self.legs.speeds(now.pose, 0.0, 1.0),

@@ -52,20 +52,20 @@ def place_legs(
         rolled: (6,) distances rolled that are no shift, because the feet aim at another
             position than that of the stance [m].
     """
-    pose = legs.pose(*posture.see_place(plane, height))
+    pose = legs.pose(*posture.to_torso(plane, height))
     slope = legs.speeds(pose, pose.heading, 0.0)
     turns = slope[..., 2] - slope[..., 1]
     rolls = legs.rolling(pose.angle) - rolled
     shift = pose.heading * (rolls / (1.0 - legs.radius * turns))
-    return shift, legs.pose(*posture.see_place(plane + shift, height))
+    return shift, legs.pose(*posture.to_torso(plane + shift, height))
 
 
 class StepPlanner:
-    """Places the legs of one robot. laws: compliant control, which lowers feet; None: none."""
+    """Places the legs of one robot. compliant: compliant control, which lowers feet; None: none."""
 
-    def __init__(self, parts: Parts, *, legs: LegSolver, laws: Compliant | None) -> None:
-        self.legs, self.laws = legs, laws
-        self.sway = None if laws is None else Sway(laws.dynamics, legs, active=parts.sway)
+    def __init__(self, parts: Parts, *, legs: LegSolver, compliant: Compliant | None) -> None:
+        self.legs, self.compliant = legs, compliant
+        self.sway = None if compliant is None else Sway(compliant.dynamics, legs, active=parts.sway)
 
     def _stand(
         self,
@@ -82,13 +82,13 @@ class StepPlanner:
         """
         plane = feet.plane - torso
         activation, lowering, masses = presence, np.zeros(LEGS), None
-        if self.laws is not None:
-            activation, lowering = self.laws.lowered(feet.phase, plane, clock, presence)
+        if self.compliant is not None:
+            activation, lowering = self.compliant.lowered(feet.phase, plane, clock, presence)
         height = feet.height - lowering
         shift, pose = place_legs(self.legs, posture, plane, height, feet.rolled)
-        if self.laws is not None:
+        if self.compliant is not None:
             way = feet.way + cis(feet.turn) * torso
-            masses = self.laws.dynamics.place(pose, way, feet.turn, posture)
+            masses = self.compliant.dynamics.place(pose, way, feet.turn, posture)
         return PlannedStep(
             value=value,
             posture=posture,
@@ -117,17 +117,17 @@ class StepPlanner:
         clock: of the gait, in the section of the step; ahead: periods from the present step.
         """
         torso, presence = absence.torso(ahead), absence.presence(ahead)
-        sway, laws = self.sway, self.laws
-        if laws is not None and sway is not None and sway.acts(laws.adaptation.narrowing):
-            guess = sway.guess(feet, laws.adaptation.laden())
+        sway, compliant = self.sway, self.compliant
+        if compliant is not None and sway is not None and sway.acts(compliant.adaptation.narrowing):
+            guess = sway.guess(feet, compliant.adaptation.laden())
             masses = self._stand(value, posture, feet, guess, clock, presence).masses
             assert masses is not None
-            part, laden = laws.adaptation.narrowing, laws.adaptation.laden()
+            part, laden = compliant.adaptation.narrowing, compliant.adaptation.laden()
             torso += part * sway.of(guess, masses, laden)
         return self._stand(value, posture, feet, torso, clock, presence)
 
     def laden(self) -> float:
         """Returns the weight that moves with the torso over the modelled one [1] (C53)."""
         assert self.sway is not None
-        assert self.laws is not None
-        return self.laws.adaptation.laden() if self.sway.active else 1.0
+        assert self.compliant is not None
+        return self.compliant.adaptation.laden() if self.sway.active else 1.0

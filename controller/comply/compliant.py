@@ -3,7 +3,7 @@
 Every period controller.py provides a plan of the present step: joint angles, the forces on the
 feet, and the torques for these forces. Compliant control corrects the plan by the measurements:
 
-    foot forces -- sense (C22) --> force laws (compliance.py, C23 to C36) --> torque, offset
+    foot forces -- sense (C22) --> force laws (force_laws.py, C23 to C36) --> torque, offset
     joint angles, attitude -- look, every 40 ms --> slow loops (hold.py, C37 to C40) --> lift, v, w
     planned angles + climb (offset + lift) ---> angle_ref (C41)
 
@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.comply.compliance import Compliance
+from hexapod_cosim.controller.comply.force_laws import ForceLaws
 from hexapod_cosim.controller.comply.load_plan import LoadPlan, plan_load
 from hexapod_cosim.controller.comply.planned_squeeze import PlannedSqueeze
 from hexapod_cosim.controller.comply.support import Support
@@ -30,7 +30,7 @@ from hexapod_cosim.controller.sense.load_adaptation import LoadAdaptation
 from hexapod_cosim.controller.signals import JointCommand, Measurement
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.gait_clock import GaitClock
-from hexapod_cosim.controller.walk.hold import Hold, Sight
+from hexapod_cosim.controller.walk.hold import Hold, HoldInput
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.controller.walk.posture import Posture
@@ -114,7 +114,7 @@ class Compliant(Stateful):
         self.squeeze = PlannedSqueeze(
             friction=robot.friction.mu, weight=robot.weight, depth=-self.dynamics.floor
         )
-        self.laws = Compliance(
+        self.laws = ForceLaws(
             gains,
             parts,
             weight=robot.weight,
@@ -215,7 +215,7 @@ class Compliant(Stateful):
 
     # -------------------------------------------------------------------------------- sensors
 
-    def _look(self, measurement: Measurement, present: PresentStep) -> None:
+    def _update_hold(self, measurement: Measurement, present: PresentStep) -> None:
         """Passes feet, loads and attitude, as measured, to the slow loops."""
         legs, angle = self.legs, measurement.angle
         w, x, y, z = measurement.quaternion.tolist()
@@ -226,8 +226,8 @@ class Compliant(Stateful):
         vx, vy, yaw_rate, commanded_height, roll, pitch = present.value.tolist()
         roll_seen = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
         pitch_seen = asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
-        self.hold.look(
-            Sight(
+        self.hold.update(
+            HoldInput(
                 plane=plane - rolled + present.torso,
                 height=height + commanded_height,
                 planned=present.plane,
@@ -259,7 +259,7 @@ class Compliant(Stateful):
         laws.step(present.load, sense(measurement, present.posture))
         if self.count % self.hold.every == 0:
             if laws.trust.level == 1.0:
-                self._look(measurement, present)
+                self._update_hold(measurement, present)
             else:
                 self.hold.reset()
         self.count += 1

@@ -28,7 +28,7 @@ from hexapod_cosim.controller.walk.kinematics import Feet, Joints, LegSolver, Po
 from hexapod_cosim.models import Robot
 
 LARGEST_PART = 0.5  # 1    of the weight: what a foot carries beyond is not taken back
-TOUCH_PART = 0.02  # 1    of the weight: a foot with more is on the ground
+CONTACT_PART = 0.02  # 1    of the weight: a foot with more is on the ground
 WHOLE_PART = 0.9  # 1    of the weight: with less in all, the force of some foot is not reported
 WEIGHT_TIME = 0.5  # s    smoothing of the sum of all loads
 EVENING = 0.15  # 1    added to the spread of the standing feet, for the tilt of the torso
@@ -97,7 +97,7 @@ class Paper(Stateful):
         self.lifted, self.yielded, self.late, self.lift = np.zeros((4, LEGS))
         self.shift: Plane = np.zeros(LEGS, dtype=np.complex128)
 
-    def _see_torso(self, step: Step, load: Array) -> None:
+    def _update_torso(self, step: Step, load: Array) -> None:
         """Updates the torso's sag and the return of the feet by the standing feet (C26, C47).
 
         load: (6,) smoothed normal forces [N].
@@ -151,16 +151,16 @@ class Paper(Stateful):
     def _suspend(self, step: Step, total: float) -> None:
         """Updates the deflections of the suspensions (C48). total: of the normal forces [N]."""
         h = self.period
-        touching = step.force[:, 2] > max(TOUCH_PART * self.weight, LEAST_LOAD)
-        missing = ~touching & ~step.swinging & (total >= WHOLE_PART * self.weight)
+        contact = step.force[:, 2] > max(CONTACT_PART * self.weight, LEAST_LOAD)
+        missing = ~contact & ~step.swinging & (total >= WHOLE_PART * self.weight)
         self.late = np.where(missing, self.late + h, 0.0)
         # the damper yields to the force beyond the share of a foot
         rate = (step.force[:, 2] - self.weight / LEGS) / self.gains.damping
         descent = np.where(step.height > EARLY_HEIGHT, np.maximum(-step.rise, 0.0), 0.0)
         met = self.yielded + h * clamp(rate, 0.0, descent)
         sought = self.yielded + h * clamp(rate, -SEARCH_SPEED, 0.0)
-        kept = np.where(step.swinging & ~touching, self.in_air, self.on_ground)
-        moved = np.where(step.swinging & touching, met, kept * self.yielded)
+        kept = np.where(step.swinging & ~contact, self.in_air, self.on_ground)
+        moved = np.where(step.swinging & contact, met, kept * self.yielded)
         moved = np.where(self.late > LATE_TIME, sought, moved)
         self.yielded = clamp(moved, -self.gains.limit, self.gains.limit)
 
@@ -173,7 +173,7 @@ class Paper(Stateful):
         started = self.weight > 0.0
         self.weight += (self.weighing if started else 1.0) * (total - self.weight)
         borne = np.minimum(load, LARGEST_PART * self.weight)
-        self._see_torso(step, load)
+        self._update_torso(step, load)
         if self.parts.paper_share:
             self._lift_swinging(step)
         if self.parts.paper_suspension:

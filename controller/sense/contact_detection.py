@@ -11,14 +11,14 @@ import numpy as np
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import LEGS, Array, Mask
 
-TOUCH_SHARE = 0.02  # 1    of the weight: a foot with more has touched down
+CONTACT_SHARE = 0.02  # 1    of the weight: a foot with more has touched down
 LIFT_SHARE = 0.005  # 1    of the weight: a foot with less has lifted off
 
 
 class ContactDetector(Stateful):
-    """Detects touch-down and lift-off with hysteresis. `touching`: (6,) feet on the ground."""
+    """Detects touch-down and lift-off with hysteresis. `contact`: (6,) feet on the ground."""
 
-    STATE = ("touching",)
+    STATE = ("contact",)
 
     def __init__(self, weight: float) -> None:
         """Starts with all feet in the air. weight: of the robot [N]."""
@@ -27,10 +27,10 @@ class ContactDetector(Stateful):
 
     def reset(self) -> None:
         """Sets all feet to be in the air."""
-        self.touching: Mask = np.zeros(LEGS, dtype=np.bool_)
+        self.contact: Mask = np.zeros(LEGS, dtype=np.bool_)
 
     def step(self, normal: Array) -> Mask:
-        """Updates and returns `touching` for normal forces (6,) [N] (C23)."""
-        limit = np.where(self.touching, LIFT_SHARE * self.weight, TOUCH_SHARE * self.weight)
-        self.touching = normal > limit
-        return self.touching
+        """Updates and returns `contact` for normal forces (6,) [N] (C23)."""
+        limit = np.where(self.contact, LIFT_SHARE * self.weight, CONTACT_SHARE * self.weight)
+        self.contact = normal > limit
+        return self.contact

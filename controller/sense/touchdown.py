@@ -63,19 +63,19 @@ class Touchdown(Stateful):
         faded = self.offset * math.exp(-self.period / RETURN_TIME)
         return np.where(np.abs(self.offset) > NEGLIGIBLE, faded, 0.0)
 
-    def _moved(self, touching: Mask, falling: Array, swinging: Mask, searching: Mask) -> Array:
+    def _moved(self, contact: Mask, falling: Array, swinging: Mask, searching: Mask) -> Array:
         """Returns the next offsets (6,) [m]. Arguments are those of step()."""
         eager = np.minimum(self.waited / PATIENCE, 1.0) ** 2
         pace = REACH_SPEED * np.where(self.late > GRACE, 1.0, eager * eager)
         reached = np.maximum(self.offset - pace * self.period, -REACH_LIMIT)
         held = np.minimum(self.offset + falling, HOLD_LIMIT)
-        in_swing = np.where(touching, np.where(falling > 0.0, held, self.offset), self._faded())
+        in_swing = np.where(contact, np.where(falling > 0.0, held, self.offset), self._faded())
         moved = np.where(swinging, in_swing, self.offset)
         return np.where(searching | (self.late > GRACE), reached, moved)
 
     def step(
         self,
-        touching: Mask,
+        contact: Mask,
         falling: Array,
         swinging: Mask,
         loaded: Mask,
@@ -85,7 +85,7 @@ class Touchdown(Stateful):
         """Advances the offsets by one period (C36).
 
         Args:
-            touching: (6,) feet that report a force.
+            contact: (6,) feet that report a force.
             falling: (6,) descent of the path in this period for feet that met the ground early [m],
                 0 for the others.
             swinging: (6,) legs planned in the air.
@@ -93,9 +93,9 @@ class Touchdown(Stateful):
             searching: (6,) feet that the gait clock waits for.
             misled: (6,) feet whose sensors have just been doubted.
         """
-        self.late = np.where(loaded & ~touching & ~misled, self.late + self.period, 0.0)
+        self.late = np.where(loaded & ~contact & ~misled, self.late + self.period, 0.0)
         self.waited = np.where(searching, self.waited + self.period, 0.0)
-        moved = self._moved(touching, falling, swinging, searching)
+        moved = self._moved(contact, falling, swinging, searching)
         self.offset = np.where(misled, self._faded(), moved)
 
 
@@ -125,27 +125,27 @@ class Landings(Stateful):
         self.met, self.before = np.full(LEGS, math.inf), np.zeros(LEGS)
         self.flew: Mask = np.zeros(LEGS, dtype=np.bool_)
 
-    def look(self, touching: Mask, height: Array, swinging: Mask) -> None:
+    def update(self, contact: Mask, height: Array, swinging: Mask) -> None:
         """Records the landings of this period.
 
         Args:
-            touching: (6,) feet that report a force.
+            contact: (6,) feet that report a force.
             height: (6,) of the paths over their ends [m].
             swinging: (6,) legs planned in the air.
         """
-        landed = touching & self.flew
+        landed = contact & self.flew
         if landed.any():
             self.before = np.where(landed & np.isfinite(self.met), self.met, self.before)
             now = np.where(swinging, np.maximum(height, 0.0), 0.0)
             self.met = np.where(landed, now, self.met)
-        self.flew = (self.flew | swinging) & ~touching
+        self.flew = (self.flew | swinging) & ~contact
 
-    def expected(self, touching: Mask, height: Array, swinging: Mask) -> Array:
+    def expected(self, contact: Mask, height: Array, swinging: Mask) -> Array:
         """Returns the heights (6,) at which the feet are expected to meet the ground [m] (C35).
 
         They are 0 before the first landing. Arguments are those of look().
         """
-        known = np.where(swinging & ~touching, np.maximum(height, 0.0), self.met)
+        known = np.where(swinging & ~contact, np.maximum(height, 0.0), self.met)
         return np.maximum(_least_of_others(known), self.before)
 
     def early(self, expected: Array, height: Array) -> Mask:

@@ -26,7 +26,7 @@ TRUSTED = 0.99  # 1    so near to its goal the trust is at it
 AIRBORNE_TIME = 0.06  # s    longest plausible force on a foot in mid-swing
 ABSENT_TIME = 0.10  # s    longest plausible lack of force on a standing foot; both exceed the lag
 MISSING_SHARE = 0.92  # 1    of the weight: with less, the force of some foot is not reported
-# 1    of the weight: as TOUCH_SHARE, LIFT_SHARE, for a doubted foot; more, because torso and feet
+# 1    of the weight: as CONTACT_SHARE, LIFT_SHARE, for a doubted foot; more, because torso and feet
 # accelerate
 FOUND_PART, GONE_PART = 0.10, 0.03
 LEAST_SHARE = 1e-6  # N    of a doubted foot, so that the shares of feet in the air are not 0 / 0
@@ -107,32 +107,32 @@ class SensorWatch(Stateful):
         """Returns the sensors (6,) that are not trusted."""
         return self.left > 0.0
 
-    def look(self, touching: Mask, total: Array | float, standing: Mask, high: Mask) -> Mask:
+    def update(self, contact: Mask, total: Array | float, standing: Mask, high: Mask) -> Mask:
         """Advances the times by one period and returns `doubted`.
 
         Args:
-            touching: (6,) feet that report a force.
+            contact: (6,) feet that report a force.
             total: the sum of all normal forces [N]; or (6,) that for each foot.
             standing: (6,) legs that are planned to carry their whole share.
             high: (6,) feet that are planned well above the ground.
         """
-        absent = (total < self.missing) & standing & ~touching
-        wrong = (touching & high) | absent
+        absent = (total < self.missing) & standing & ~contact
+        wrong = (contact & high) | absent
         self.contradicted = np.where(wrong, self.contradicted + self.period, 0.0)
         too_long = self.contradicted > np.where(high, AIRBORNE_TIME, ABSENT_TIME)
         rest = np.maximum(self.left - self.period, 0.0)
         self.left = np.where(too_long, self.memory, rest)
         return self.doubted
 
-    def found(self, load: Array, touching: Mask) -> Mask:
+    def found(self, load: Array, contact: Mask) -> Mask:
         """Returns which feet (6,) have contact if their sensors are doubted (C34).
 
-        load: (6,) that replaces the measured one [N]; touching: (6,) a period ago.
+        load: (6,) that replaces the measured one [N]; contact: (6,) a period ago.
         """
-        return np.asarray(load > np.where(touching, GONE_PART, FOUND_PART) * self.weight)
+        return np.asarray(load > np.where(contact, GONE_PART, FOUND_PART) * self.weight)
 
 
-def replaced(force: Array, planned: Array, touching: Mask, doubted: Mask) -> Array:
+def replaced(force: Array, planned: Array, contact: Mask, doubted: Mask) -> Array:
     """Returns the forces (6, 3) [N], with those of the doubted feet replaced (C34).
 
     Doubted feet carry what the others leave of the weight, in the shares of the plan.
@@ -140,10 +140,10 @@ def replaced(force: Array, planned: Array, touching: Mask, doubted: Mask) -> Arr
     Args:
         force: (6, 3) that the sensors report [N].
         planned: (6, 3) for the measured weight [N].
-        touching: (6,) feet that report a force.
+        contact: (6,) feet that report a force.
         doubted: (6,) feet, of which there is one at least.
     """
-    left = float(planned[:, 2].sum()) - float(force[touching & ~doubted, 2].sum())
+    left = float(planned[:, 2].sum()) - float(force[contact & ~doubted, 2].sum())
     shares = np.where(doubted, planned[:, 2] + LEAST_SHARE, 0.0)
     load = max(left, 0.0) * shares / shares.sum()
     guess = np.column_stack((planned[:, :2], load))

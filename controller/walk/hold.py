@@ -24,7 +24,7 @@ LOADED_FROM = 0.4  # 1    thirds of the weight; a foot with more load does not s
 DETERMINANT_FLOOR = 1e-6  # m4    feet on one line determine no plane
 
 
-class Sight(NamedTuple):
+class HoldInput(NamedTuple):
     """Measurements at a look; feet (6,) are in the walking frame."""
 
     plane: Plane  # m    contact points by the encoders, x + i y
@@ -94,7 +94,7 @@ class Hold(Stateful):
         self.angle, self.height = np.zeros(2), 0.0
         self.last: tuple[Plane, Array, float] | None = None
 
-    def _hold_posture(self, seen: Sight) -> None:
+    def _hold_posture(self, seen: HoldInput) -> None:
         """Integrates height and tilt against the ground (C38)."""
         fit = fit_plane(seen.planned, seen.height - seen.planned_height, seen.load)
         if fit is None:
@@ -113,7 +113,7 @@ class Hold(Stateful):
         roll, pitch = self.angle
         self.lift = seen.planned.real * pitch - seen.planned.imag * roll - self.height
 
-    def _add_lost_way(self, seen: Sight, feet: Plane) -> None:
+    def _add_lost_way(self, seen: HoldInput, feet: Plane) -> None:
         """Adds the deviation of the path since the last look (C39).
 
         feet: (6,) contact points turned by the yaw [m].
@@ -131,7 +131,7 @@ class Hold(Stateful):
         turned = math.remainder(seen.yaw - yaw, math.tau)
         self.heading += seen.yaw_rate * self.time - turned
 
-    def _hold_path(self, seen: Sight) -> None:
+    def _hold_path(self, seen: HoldInput) -> None:
         """Computes the added velocity that leads the robot back to its path (C39, C40)."""
         gains, turned = self.gains, complex(cis(seen.yaw))
         feet = turned * seen.plane
@@ -142,7 +142,7 @@ class Hold(Stateful):
         turn = gains.path_rate * self.heading
         self.yaw_rate = min(max(turn, -gains.turn_limit), gains.turn_limit)
 
-    def look(self, seen: Sight) -> None:
+    def update(self, seen: HoldInput) -> None:
         """Updates the corrections of height, tilt and velocity from the measured posture."""
         if self.parts.posture:
             self._hold_posture(seen)

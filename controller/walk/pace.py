@@ -72,7 +72,7 @@ class Pace(Stateful):
         back = cis(-w * self.time)
         plane = back * (home + self.part * step - travel(twist, self.time))
         velocity = back * (self.rate * step) - (twist.velocity + 1j * w * plane)
-        feet = posture.see(Feet(plane - torso, self.height, velocity, self.rise))
+        feet = posture.feet_to_torso(Feet(plane - torso, self.height, velocity, self.rise))
         pose = self.legs.pose(feet.plane, feet.height)
         speed = self.legs.speeds(pose, feet.velocity, feet.rise)
         return np.asarray(np.abs(speed).max(axis=(0, 2)) / self.legs.speed_max)

@@ -47,17 +47,17 @@ class Posture(NamedTuple):
         """Returns R_TK p of vectors p = (x + i y, z) of any shape: walking axes to torso axes."""
         return (plane, z) if self.level else _product(self.rotation.T, plane, z)
 
-    def see_place(self, plane: Any, height: Any) -> tuple[Any, Any]:
+    def to_torso(self, plane: Any, height: Any) -> tuple[Any, Any]:
         """Converts points (x + i y, z) [m] from the walking frame to the torso frame."""
         # p_T = R_TK (p_K - height e_z)
         return self.turn_back(plane, height - self.height)
 
-    def see(self, feet: Feet) -> Feet:
+    def feet_to_torso(self, feet: Feet) -> Feet:
         """Converts positions and velocities of feet from the walking frame to the torso frame."""
         if self.level:
             return feet
         x, y, z = self.spin
-        plane, height = self.see_place(feet.plane, feet.height)
+        plane, height = self.to_torso(feet.plane, feet.height)
         # v_T = R_TK (v_K - rate e_z) - w_T x p_T
         velocity, rise = self.turn_back(feet.velocity, feet.rise - self.rate)
         velocity = velocity - ((y - 1j * x) * height + 1j * z * plane)

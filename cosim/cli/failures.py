@@ -42,6 +42,7 @@ SETTINGS = {
     "--friction": "friction.mu=0.4",
     "--mu": "friction.mu=0.4",
     "--vx": "command.vx=0.12",
+    "--speed": "command.vx=0.12",
 }
 
 

@@ -60,7 +60,7 @@ from hexapod_cosim.cosim.cli import main
         (["compare", "--seeds", "x"], ["Invalid value 'x' for '--seeds'", "compare --help"]),
         (
             ["simulate", "--set", "duration", "3"],
-            ["--set: not a setting", "got 'duration'", "write --set duration=VALUE"],
+            ["--set: not a setting", "got 'duration'", "write duration=VALUE"],
         ),
         (
             ["simulate", "--set", "gait=ripple"],
@@ -197,7 +197,11 @@ def test_an_unexpected_error_is_one_line_with_a_hint(
         (
             ["simulate", "--speed", "3"],
             2,
-            {"what": "not understood", "got": "No such option: --speed (Possible options: --set)"},
+            {
+                "what": "not understood",
+                "got": "No such option: --speed (Possible options: --set)",
+                "fix": "write --set command.vx=0.12; `hexapod simulate --help` explains it",
+            },
         ),
         (
             ["compare", "--seeds", "0"],

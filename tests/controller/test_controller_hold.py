@@ -14,7 +14,7 @@ from gains import HOLD, PERIOD
 from standing import HOME
 
 from hexapod_cosim.controller import Parts
-from hexapod_cosim.controller.walk.hold import Hold, Sight, fit_plane
+from hexapod_cosim.controller.walk.hold import Hold, HoldInput, fit_plane
 
 LEVEL = np.full(6, -0.12)  # m; planned heights of the feet
 LOADS = np.full(6, 0.5)  # relative to a third of the weight
@@ -26,9 +26,9 @@ def make(parts: Parts | None = None, **changes: float) -> Hold:
     return Hold(replace(HOLD, **changes), Parts() if parts is None else parts, period=PERIOD)
 
 
-def sight(**changes: Any) -> Sight:
+def sight(**changes: Any) -> HoldInput:
     """Returns what the loops see of a robot that rests as planned, with changes."""
-    still = Sight(HOME, LEVEL, HOME, LEVEL, LOADS, np.zeros(2), 0.0, 0j, 0.0)
+    still = HoldInput(HOME, LEVEL, HOME, LEVEL, LOADS, np.zeros(2), 0.0, 0j, 0.0)
     values: dict[str, Any] = {
         name: np.array(value) if isinstance(value, list | tuple) else value
         for name, value in changes.items()
@@ -70,7 +70,7 @@ def settle(
         # pitch grows by b, roll by -c
         now = np.add([low, roll, pitch], [a, -c, b])
         tilt = now[1] + ground[0], now[2] + ground[1]
-        hold.look(sight(height=seen_heights(*now), tilt=tilt))
+        hold.update(sight(height=seen_heights(*now), tilt=tilt))
         yield now
 
 
@@ -139,12 +139,12 @@ def test_ground_that_begins_to_slope_is_followed_with_its_time() -> None:
 def test_corrections_of_the_posture_have_limits() -> None:
     hold = make()
     for _ in range(500):
-        hold.look(sight(height=seen_heights(0.05, 0.0, 0.0)))
+        hold.update(sight(height=seen_heights(0.05, 0.0, 0.0)))
     np.testing.assert_allclose(hold.lift, -HOLD.height_limit)
     hold.reset()
-    hold.look(sight())
+    hold.update(sight())
     for _ in range(60):
-        hold.look(sight(height=seen_heights(0.0, 0.4, 0.0), tilt=(0.4, 0.0)))
+        hold.update(sight(height=seen_heights(0.0, 0.4, 0.0), tilt=(0.4, 0.0)))
     np.testing.assert_allclose(hold.lift, HOLD.angle_limit * HOME.imag, atol=EXACT)
 
 
@@ -155,7 +155,7 @@ def test_a_foot_counts_beyond_four_tenths_of_a_third_of_the_weight() -> None:
         assert bool(np.abs(found).max() > 1e-5) is counts
         hold = make()
         for k in range(2):
-            hold.look(sight(plane=HOME - 0.01 * k, load=[load] * 6))
+            hold.update(sight(plane=HOME - 0.01 * k, load=[load] * 6))
         assert (abs(hold.way) > 1e-3) is counts
 
 
@@ -182,7 +182,7 @@ def walk(
         shaken = np.where(
             np.array(loads) > 0.0, feet, feet + 0.1 * np.sin(k)
         )  # feet in the air may be anywhere
-        hold.look(
+        hold.update(
             sight(plane=shaken, load=loads, yaw=yaw, velocity=ordered[0], yaw_rate=ordered[1])
         )
     return way, yaw
@@ -208,7 +208,7 @@ def test_without_a_foot_that_stood_all_the_time_the_way_is_taken_as_commanded() 
     hold = make()
     for k in range(10):
         loads = [1.0 if (leg + k) % 2 else 0.0 for leg in range(6)]
-        hold.look(sight(plane=HOME * k, load=loads, velocity=0.1 + 0j))
+        hold.update(sight(plane=HOME * k, load=loads, velocity=0.1 + 0j))
     assert hold.way == 0j
 
 
@@ -220,7 +220,7 @@ def test_steering_drives_a_steady_loss_to_a_steady_correction_that_makes_it_good
     hold, time, way, yaw = make(), make().every * PERIOD, 0j, heading
     for _ in range(600):
         feet = np.exp(-1j * yaw) * (HOME - way)
-        hold.look(sight(plane=feet, yaw=yaw, velocity=0.08 + 0j, yaw_rate=0.0))
+        hold.update(sight(plane=feet, yaw=yaw, velocity=0.08 + 0j, yaw_rate=0.0))
         way += np.exp(1j * yaw) * (0.08 + hold.velocity - 0.006) * time
         yaw += (hold.yaw_rate + 0.01) * time
     # the turn leaves a constant heading error, so the robot walks a little sideways to keep to the
@@ -236,7 +236,7 @@ def test_steering_drives_a_steady_loss_to_a_steady_correction_that_makes_it_good
 def test_parts_switched_off_do_nothing() -> None:
     hold = make(Parts(posture=False, path=False))
     walk(hold, 0.07 + 0j, 0.1, legs=(0, 2, 4), ordered=(0.08 + 0j, 0.0))
-    hold.look(sight(height=seen_heights(0.01, 0.1, 0.1), tilt=(0.1, 0.1)))
+    hold.update(sight(height=seen_heights(0.01, 0.1, 0.1), tilt=(0.1, 0.1)))
     assert not any(hold.lift)
     assert hold.velocity == 0j
     assert hold.yaw_rate == 0.0

@@ -59,7 +59,7 @@ def moving(
         [Posture.of(row, np.zeros(3)) for row in posture],
     )
     before, now, after = (
-        legs.pose(*torso.see_place(*foot))
+        legs.pose(*torso.to_torso(*foot))
         for torso, foot in zip(torsos, zip(plane, height, strict=True), strict=True)
     )
     masses = [

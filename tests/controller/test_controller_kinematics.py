@@ -225,19 +225,19 @@ def test_positive_roll_lowers_the_right_side_and_positive_pitch_the_nose() -> No
 @pytest.mark.parametrize("t", TIMES)
 def test_feet_are_seen_where_the_torso_puts_them_back_on_the_ground(t: float) -> None:
     feet, torso = moving_feet(t), posture(t)
-    seen = torso.see(feet)
+    seen = torso.feet_to_torso(feet)
     plane, height = torso.turn(seen.plane, seen.height)
     np.testing.assert_allclose(plane, feet.plane, atol=POSTURE_ROUND_OFF)
     np.testing.assert_allclose(height + torso.height, feet.height, atol=POSTURE_ROUND_OFF)
     np.testing.assert_array_equal(
-        torso.see_place(feet.plane, feet.height), (seen.plane, seen.height)
+        torso.to_torso(feet.plane, feet.height), (seen.plane, seen.height)
     )
 
 
 @pytest.mark.parametrize("t", TIMES)
 def test_velocities_are_the_slopes_of_positions_while_feet_and_torso_move(t: float) -> None:
     before, now, after = (
-        posture(at).see(moving_feet(at)) for at in (t - TIME_STEP, t, t + TIME_STEP)
+        posture(at).feet_to_torso(moving_feet(at)) for at in (t - TIME_STEP, t, t + TIME_STEP)
     )
     np.testing.assert_allclose(
         now.velocity, (after.plane - before.plane) / (2.0 * TIME_STEP), atol=RATE_ERROR

@@ -40,7 +40,7 @@ def test_a_foot_touches_down_above_2_percent_of_the_weight_and_lifts_off_below_h
 def until_doubted(watch: SensorWatch, leg: int, **seen: np.ndarray | float) -> int:
     """Returns the time [s] after which a sensor is doubted; no other sensor may ever be doubted."""
     for count in range(1, 1000):
-        doubted = watch.look(**seen)  # type: ignore[arg-type]
+        doubted = watch.update(**seen)  # type: ignore[arg-type]
         assert not any(doubted[other] for other in range(6) if other != leg)
         if doubted[leg]:
             return count
@@ -49,21 +49,21 @@ def until_doubted(watch: SensorWatch, leg: int, **seen: np.ndarray | float) -> i
 
 def test_a_dead_sensor_of_a_foot_that_carries_is_doubted_after_a_tenth_of_a_second() -> None:
     watch = SensorWatch(LOAD, cycle=CYCLE, period=SAMPLE)
-    count = until_doubted(watch, 2, touching=but(2), total=40.0, standing=ALL_LEGS, high=NO_LEGS)
+    count = until_doubted(watch, 2, contact=but(2), total=40.0, standing=ALL_LEGS, high=NO_LEGS)
     assert count in {20, 21}  # times are sums of periods
 
 
 def test_a_stuck_sensor_of_a_foot_in_mid_swing_is_doubted_after_60_milliseconds() -> None:
     watch = SensorWatch(LOAD, cycle=CYCLE, period=SAMPLE)
-    count = until_doubted(watch, 2, touching=ALL_LEGS, total=LOAD, standing=but(2), high=only(2))
+    count = until_doubted(watch, 2, contact=ALL_LEGS, total=LOAD, standing=but(2), high=only(2))
     assert count in {12, 13}
 
 
 def test_a_doubted_foot_touches_down_above_10_percent_and_lifts_off_below_3_percent() -> None:
-    watch, touching, found = SensorWatch(LOAD, cycle=CYCLE, period=SAMPLE), NO_LEGS, []
+    watch, contact, found = SensorWatch(LOAD, cycle=CYCLE, period=SAMPLE), NO_LEGS, []
     for force in (0.0, 4.9, 5.1, 1.6, 1.4, 4.9):  # N
-        touching = watch.found(np.full(6, force), touching)
-        found.append(bool(touching[2]))
+        contact = watch.found(np.full(6, force), contact)
+        found.append(bool(contact[2]))
     assert found == [False, False, True, True, False, False]
 
 
@@ -82,24 +82,26 @@ def test_doubted_feet_bear_what_the_others_leave_in_the_shares_of_the_plan() -> 
 def test_a_missing_foothold_whose_weight_the_others_carry_is_not_a_dead_sensor() -> None:
     watch = SensorWatch(LOAD, cycle=CYCLE, period=SAMPLE)
     for _ in range(1000):
-        assert not any(watch.look(but(2), 46.1, ALL_LEGS, NO_LEGS))  # N; 92 % of the weight are 46
+        assert not any(
+            watch.update(but(2), 46.1, ALL_LEGS, NO_LEGS)
+        )  # N; 92 % of the weight are 46
     assert not watch.busy()
-    assert until_doubted(watch, 2, touching=but(2), total=45.9, standing=ALL_LEGS, high=NO_LEGS)
+    assert until_doubted(watch, 2, contact=but(2), total=45.9, standing=ALL_LEGS, high=NO_LEGS)
 
 
 def test_a_foot_that_need_not_carry_or_is_not_high_contradicts_nothing() -> None:
     watch = SensorWatch(LOAD, cycle=CYCLE, period=SAMPLE)
     for _ in range(200):
-        assert not watch.look(NO_LEGS, 0.0, NO_LEGS, ALL_LEGS).any()
-        assert not watch.look(ALL_LEGS, LOAD, NO_LEGS, NO_LEGS).any()
+        assert not watch.update(NO_LEGS, 0.0, NO_LEGS, ALL_LEGS).any()
+        assert not watch.update(ALL_LEGS, LOAD, NO_LEGS, NO_LEGS).any()
     assert not watch.busy()
 
 
 def test_a_sensor_is_trusted_again_after_one_and_a_half_cycles_without_contradiction() -> None:
     watch = SensorWatch(LOAD, cycle=CYCLE, period=SAMPLE)
-    until_doubted(watch, 2, touching=but(2), total=0.5 * LOAD, standing=ALL_LEGS, high=NO_LEGS)
+    until_doubted(watch, 2, contact=but(2), total=0.5 * LOAD, standing=ALL_LEGS, high=NO_LEGS)
     count = 0
-    while watch.look(ALL_LEGS, LOAD, ALL_LEGS, NO_LEGS)[2]:
+    while watch.update(ALL_LEGS, LOAD, ALL_LEGS, NO_LEGS)[2]:
         assert watch.busy()
         count += 1
     assert abs(count - 300) <= 2
@@ -216,9 +218,9 @@ ONLY_TOUCHDOWN = Parts(support=False, fallback=False)
 
 def step(landings: Landings, swinging: np.ndarray, heights: list[float]) -> None:
     """Takes a step in which these legs swing and land at heights [m], while the others stand."""
-    landings.look(~swinging, np.full(6, 0.03), swinging)
-    landings.look(ALL, np.array(heights), swinging)
-    landings.look(ALL, LOW, NONE)
+    landings.update(~swinging, np.full(6, 0.03), swinging)
+    landings.update(ALL, np.array(heights), swinging)
+    landings.update(ALL, LOW, NONE)
 
 
 def landed() -> Landings:

@@ -8,7 +8,7 @@ import numpy as np
 from gains import PERIOD, make_gains, weight
 
 from hexapod_cosim.controller import Gains, LegSolver, Parts, make_gait
-from hexapod_cosim.controller.comply.compliance import Compliance
+from hexapod_cosim.controller.comply.force_laws import ForceLaws
 from hexapod_cosim.controller.comply.load_plan import LoadPlan, plan_load
 from hexapod_cosim.controller.comply.support import Support
 from hexapod_cosim.controller.walk.gait_clock import GaitClock
@@ -29,7 +29,7 @@ def rest(robot: Robot) -> Demand:
     return InverseDynamics(robot, LegSolver(robot), period=PERIOD).rest()
 
 
-class Laws(Compliance):
+class Laws(ForceLaws):
     """The laws, and what the present step requires of them."""
 
     planned: LoadPlan

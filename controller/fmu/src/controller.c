@@ -38,7 +38,7 @@ void hx_controller_exchange(hxControllerModel *model, const hxFootPathsModel *be
   hxControllerOutput *output = &state->output;
   hx_walk_plan_carry(&model->plan, before, &state->plan);
   hx_fade_begin(&model->fade, output, &state->fade);
-  if (planner->compliant) hx_compliant_reset(&planner->laws, &state->compliant);
+  if (planner->is_compliant) hx_compliant_reset(&planner->compliant, &state->compliant);
   memset(&state->paper, 0, sizeof state->paper);
   memset(&state->health, 0, sizeof state->health);
   memset(output->shift, 0, sizeof output->shift);
@@ -154,7 +154,7 @@ void hx_controller_begin(const hxControllerModel *model, double t, hxControllerS
   const hxStepPlanner *planner = &model->plan.planner;
   memset(state, 0, sizeof *state);
   state->start = state->time = t;
-  if (planner->compliant) hx_compliant_reset(&planner->laws, &state->compliant);
+  if (planner->is_compliant) hx_compliant_reset(&planner->compliant, &state->compliant);
   hx_walk_plan_reset(&model->plan, &state->compliant, &state->plan);
   follow_paths(model, state);
 }
@@ -174,10 +174,10 @@ void hx_controller_tick(const hxControllerModel *model, const hxControllerInput 
   ++state->tick;
   follow_paths(model, state);
   if (model->paper) correct_paths(model, input, state);
-  if (planner->compliant) {
+  if (planner->is_compliant) {
     hx_walk_plan_present_step(&model->plan, &state->compliant, state->output.speed_ref,
                               &state->plan, &present);
-    hx_compliant_step(&planner->laws, planner->leg, &present, input, &state->compliant,
+    hx_compliant_step(&planner->compliant, planner->leg, &present, input, &state->compliant,
                       &state->output);
   }
   if (state->fade.left) hx_fade_step(&model->fade, planner->leg, &state->fade, &state->output);

@@ -35,7 +35,8 @@ static inline void hx_walk_plan_compile(const hxControllerDefinition *definition
   hx_command_ramp_compile(definition->gait.period, definition->period, &model->ramp);
   hx_foot_paths_compile(definition, model->planner.leg, &model->paths);
   hx_pace_compile(&model->paths, &model->pace);
-  if (model->planner.compliant) model->paths.clock.handover = model->planner.laws.support.handover;
+  if (model->planner.is_compliant)
+    model->paths.clock.handover = model->planner.compliant.support.handover;
   hx_absence_compile(model->paths.home, model->paths.clock.handover * definition->gait.period,
                      model->period, &model->absent);
 }
@@ -72,7 +73,7 @@ static inline int hx_walk_plan_aim(const hxWalkPlanModel *model, const double co
 
 /* Computes the command a number of periods ahead, including the posture, and returns the motion of
  * the body. number: periods since the section began. */
-static inline hxTwist look_ahead(const hxWalkPlanModel *model, const hxCompliant *laws,
+static inline hxTwist look_ahead(const hxWalkPlanModel *model, const hxCompliant *compliant,
                                  const hxWalkPlan *plan, int64_t ahead, int64_t number,
                                  hxPlannedStep *step) {
   hx_command_ramp_ahead(&model->ramp, &plan->ramp, ahead, step->value, step->rate);
@@ -81,97 +82,98 @@ static inline hxTwist look_ahead(const hxWalkPlanModel *model, const hxCompliant
   step->value[1] += drift.y;
   hx_posture_of(&step->posture, step->value + 3, step->rate + 3);
   const hxTwist twist = {{step->value[0], step->value[1]}, step->value[2]};
-  if (!model->planner.compliant) return twist;
-  const hxTwist added = hx_compliant_addition(&model->planner.laws, laws, number);
+  if (!model->planner.is_compliant) return twist;
+  const hxTwist added = hx_compliant_addition(&model->planner.compliant, compliant, number);
   return (hxTwist){hx_plane_add(twist.velocity, added.velocity), twist.yaw_rate + added.yaw_rate};
 }
 
 /* Places the legs for planned feet. ahead: periods from the present step. */
-static inline void lay_out(const hxWalkPlanModel *model, const hxCompliant *laws,
+static inline void lay_out(const hxWalkPlanModel *model, const hxCompliant *compliant,
                            const hxWalkPlan *plan, int64_t ahead, hxPlannedStep *step) {
-  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, laws, &model->absent, &plan->absence,
-                          ahead, step);
+  hx_step_planner_lay_out(&model->planner, &plan->paths.clock, compliant, &model->absent,
+                          &plan->absence, ahead, step);
 }
 
 /* Plans to stand in the stance. */
-static inline void hx_walk_plan_reset(const hxWalkPlanModel *model, const hxCompliant *laws,
+static inline void hx_walk_plan_reset(const hxWalkPlanModel *model, const hxCompliant *compliant,
                                       hxWalkPlan *plan) {
   hxPlannedStep *step = hx_walk_plan_step(plan, 0);
   hx_command_ramp_reset(&model->ramp, &plan->ramp);
   plan->cut = 1;
   hx_absence_reset(&model->absent, &plan->absence);
   hx_foot_paths_reset(&model->paths, &plan->paths, &step->feet);
-  look_ahead(model, laws, plan, 0, 0, step);
-  lay_out(model, laws, plan, 0, step);
+  look_ahead(model, compliant, plan, 0, 0, step);
+  lay_out(model, compliant, plan, 0, step);
 }
 
 /* Plans the step a number of periods after the section began. before: the step before it. */
-static inline void plan_step(const hxWalkPlanModel *model, const hxCompliant *laws,
+static inline void plan_step(const hxWalkPlanModel *model, const hxCompliant *compliant,
                              const hxWalkPlan *plan, int64_t number, const hxPlannedStep *before,
                              hxPlannedStep *step) {
-  const hxTwist twist = look_ahead(model, laws, plan, 1, number, step);
+  const hxTwist twist = look_ahead(model, compliant, plan, 1, number, step);
   hx_foot_paths_walk(&model->paths, &plan->paths, number, twist, &before->feet, &step->feet);
-  lay_out(model, laws, plan, 1, step);
+  lay_out(model, compliant, plan, 1, step);
 }
 
 /* ----------------------------------------------------------------------------------- sections */
 
 /* Notes which feet have met the ground on their way down (C51), and narrows the stance: the steps
  * of a commanded motion aim at the stance that the weight asks for (C53). */
-static inline void follow_sensors(const hxWalkPlanModel *model, const hxCompliant *laws,
+static inline void follow_sensors(const hxWalkPlanModel *model, const hxCompliant *compliant,
                                   hxWalkPlan *plan) {
   const hxPlannedFeet *feet = &hx_walk_plan_step(plan, 0)->feet;
   hxFootPaths *paths = &plan->paths;
   for (int k = 0; k < HX_LEGS; ++k)
     paths->met[k] = paths->clock.swinging[k] && feet->rise[k] < 0.0 &&
-                    hx_compliance_meets(&model->planner.laws.laws, k, &laws->laws);
-  if (hx_command_ramp_moves(&plan->ramp)) paths->narrowing = laws->adaptation.narrowing;
+                    hx_force_laws_meets(&model->planner.compliant.laws, k, &compliant->laws);
+  if (hx_command_ramp_moves(&plan->ramp)) paths->narrowing = compliant->adaptation.narrowing;
 }
 
 /* Returns whether the gait clock waits for feet at the ends of their swings (C50). It does not
  * without a leg, because a foot may then have no load to carry. */
-static inline int waits(const hxWalkPlanModel *model, const hxCompliant *laws,
+static inline int waits(const hxWalkPlanModel *model, const hxCompliant *compliant,
                         const hxWalkPlan *plan) {
   const hxGaitClock *clock = &plan->paths.clock;
   int landing[HX_LEGS];
-  if (!model->planner.compliant) return 0;
+  if (!model->planner.is_compliant) return 0;
   for (int k = 0; k < HX_LEGS; ++k)
     if (clock->absent[k]) return 0;
   hx_gait_clock_landing(&model->paths.clock, clock, plan->at, landing);
-  return hx_compliance_waits(&model->planner.laws.laws, landing, clock->waiting, &laws->laws);
+  return hx_force_laws_waits(&model->planner.compliant.laws, landing, clock->waiting,
+                             &compliant->laws);
 }
 
 /* Begins a new section at the present step, and plans the next step. waiting: the gait clock stands
  * still in it. */
-static inline void plan_afresh(const hxWalkPlanModel *model, int waiting, hxCompliant *laws,
+static inline void plan_afresh(const hxWalkPlanModel *model, int waiting, hxCompliant *compliant,
                                hxWalkPlan *plan) {
   const int moves = hx_command_ramp_moves(&plan->ramp),
             settled = hx_command_ramp_settled(&model->ramp, &plan->ramp);
   hxPlannedStep *first = hx_walk_plan_step(plan, 0);
   const hxPlannedFeet now = first->feet;
-  if (model->planner.compliant)
-    hx_compliant_steer(&model->planner.laws, plan->at, moves, plan->cut, laws);
-  const hxTwist twist = look_ahead(model, laws, plan, 0, 0, first);
+  if (model->planner.is_compliant)
+    hx_compliant_steer(&model->planner.compliant, plan->at, moves, plan->cut, compliant);
+  const hxTwist twist = look_ahead(model, compliant, plan, 0, 0, first);
   if (waiting)
     hx_foot_paths_hold(&model->paths, &now, plan->at, twist, &plan->paths, &first->feet);
   else
     hx_foot_paths_plan(&model->paths, &now, plan->at, moves || !settled, twist, &plan->paths,
                        &first->feet);
-  lay_out(model, laws, plan, 0, first);
+  lay_out(model, compliant, plan, 0, first);
   plan->last = moves || settled ? INT64_MAX : model->ramp.end - plan->ramp.steps;
   plan->at = 0;
-  plan_step(model, laws, plan, 1, first, hx_walk_plan_step(plan, 1));
+  plan_step(model, compliant, plan, 1, first, hx_walk_plan_step(plan, 1));
 }
 
 /* Makes the planned step the present one, and plans the step after it. command_changed: the plan no
  * longer applies, and a new section begins. */
 static inline void hx_walk_plan_advance(const hxWalkPlanModel *model, int command_changed,
-                                        hxCompliant *laws, hxWalkPlan *plan) {
+                                        hxCompliant *compliant, hxWalkPlan *plan) {
   const int due = command_changed || !plan->has_after;
-  if (model->planner.compliant) follow_sensors(model, laws, plan);
+  if (model->planner.is_compliant) follow_sensors(model, compliant, plan);
   if (due || plan->paths.clock.waiting) {
-    const int waiting = waits(model, laws, plan);
-    if (due || !waiting) plan_afresh(model, waiting, laws, plan);
+    const int waiting = waits(model, compliant, plan);
+    if (due || !waiting) plan_afresh(model, waiting, compliant, plan);
   }
   plan->present = (plan->present + 1) % 3;
   ++plan->at;
@@ -186,7 +188,7 @@ static inline void hx_walk_plan_advance(const hxWalkPlanModel *model, int comman
   plan->has_after = reached && next <= plan->last;
   plan->cut = !reached && next <= plan->last;
   if (plan->has_after)
-    plan_step(model, laws, plan, next, hx_walk_plan_step(plan, 0), hx_walk_plan_step(plan, 1));
+    plan_step(model, compliant, plan, next, hx_walk_plan_step(plan, 0), hx_walk_plan_step(plan, 1));
 }
 
 /* ----------------------------------------------------------------- change of gait and control */
@@ -241,7 +243,7 @@ static HX_SELDOM void hx_walk_plan_carry(hxWalkPlanModel *model, const hxFootPat
   memcpy(clock->offset, before->clock.offset, sizeof clock->offset);
   memcpy(clock->late, before->clock.late, sizeof clock->late);
   memset(plan->paths.met, 0, sizeof plan->paths.met);
-  if (!model->planner.compliant) plan->paths.narrowing = 0.0;
+  if (!model->planner.is_compliant) plan->paths.narrowing = 0.0;
   plan->has_after = 0;
   plan->cut = 1;
 }
@@ -267,7 +269,7 @@ static inline void hx_walk_plan_centre(hxWalkPlan *plan, int k, double centre[3]
   const hxPlannedStep *now = hx_walk_plan_step(plan, 0);
   hxPlane plane = hx_plane_add(now->plane[k], now->shift[k]);
   double height = now->feet.height[k];
-  hx_posture_see_place(&now->posture, &plane, &height);
+  hx_posture_to_torso(&now->posture, &plane, &height);
   centre[0] = plane.x;
   centre[1] = plane.y;
   centre[2] = height;
@@ -288,7 +290,7 @@ static inline void hx_walk_plan_foot(const hxWalkPlanModel *model, hxWalkPlan *p
   *height = now->height[k];
   *rise = now->feet.rise[k] -
           rate_of(plan, before->lowering[k], now->lowering[k], after->lowering[k], period);
-  hx_posture_see(&now->posture, plane, height, velocity, rise);
+  hx_posture_feet_to_torso(&now->posture, plane, height, velocity, rise);
 }
 
 /* Returns the height of the path of a foot over the stance [m]. */
@@ -318,7 +320,8 @@ static inline hxNeighbours hx_walk_plan_motion(hxWalkPlan *plan) {
 
 /* Fills the planned loads and the geometry of the present step for the laws (C15 to C20). speed: of
  * the joints [rad/s]. */
-static inline void hx_walk_plan_present_step(const hxWalkPlanModel *model, const hxCompliant *laws,
+static inline void hx_walk_plan_present_step(const hxWalkPlanModel *model,
+                                             const hxCompliant *compliant,
                                              double speed[HX_LEGS][HX_JOINTS], hxWalkPlan *plan,
                                              hxPresentStep *present) {
   const hxStepPlanner *planner = &model->planner;
@@ -327,9 +330,9 @@ static inline void hx_walk_plan_present_step(const hxWalkPlanModel *model, const
   hxLoadPlan *load = &present->load;
   double height[HX_LEGS];
   hxDemand demand;
-  hx_inverse_dynamics_demand(&planner->laws.dynamics, planner->leg, &motion,
+  hx_inverse_dynamics_demand(&planner->compliant.dynamics, planner->leg, &motion,
                              (const double (*)[HX_JOINTS])speed, &now->posture,
-                             hx_step_planner_laden(planner, laws), &demand);
+                             hx_step_planner_laden(planner, compliant), &demand);
   for (int k = 0; k < HX_LEGS; ++k) {
     load->feet[k] = hx_plane_add(now->plane[k], now->shift[k]);
     height[k] = hx_walk_plan_lift(model, plan, k);
@@ -339,7 +342,7 @@ static inline void hx_walk_plan_present_step(const hxWalkPlanModel *model, const
     hx_leg_solver_speeds(&planner->leg[k], &now->pose[k], hx_plane(0.0, 0.0), 1.0,
                          present->climb[k]);
   }
-  hx_compliant_plan(&planner->laws, laws, height, now->feet.rise, &demand, load);
+  hx_compliant_plan(&planner->compliant, compliant, height, now->feet.rise, &demand, load);
   present->value = now->value;
   present->posture = &now->posture;
   present->plane = now->feet.plane;

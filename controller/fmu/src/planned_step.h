@@ -27,19 +27,19 @@ typedef struct hxPlannedStep {
 
 /* Constants of the plan of a step. */
 typedef struct hxStepPlanner {
-  int compliant; /* compliant control, which lowers feet; otherwise there are no laws */
+  int is_compliant; /* compliant control, which lowers feet */
   hxLegSolver leg[HX_LEGS];
-  hxCompliantModel laws;
+  hxCompliantModel compliant; /* if is_compliant */
   hxSway sway;
 } hxStepPlanner;
 
 static inline void hx_step_planner_compile(const hxControllerDefinition *definition,
                                            hxStepPlanner *model) {
-  model->compliant = definition->control == HX_CONTROL_COMPLIANT;
+  model->is_compliant = definition->control == HX_CONTROL_COMPLIANT;
   for (int k = 0; k < HX_LEGS; ++k) hx_leg_solver_compile(definition, k, &model->leg[k]);
-  if (!model->compliant) return;
-  hx_compliant_compile(definition, model->leg, &model->laws);
-  hx_sway_compile(definition, model->leg, &model->laws.dynamics, &model->sway);
+  if (!model->is_compliant) return;
+  hx_compliant_compile(definition, model->leg, &model->compliant);
+  hx_sway_compile(definition, model->leg, &model->compliant.dynamics, &model->sway);
 }
 
 /* Computes the poses of legs whose contact points are shifted from the planned feet. */
@@ -50,7 +50,7 @@ static inline void reach_all(const hxLegSolver leg[HX_LEGS], const hxPlane shift
   for (int k = 0; k < HX_LEGS; ++k) {
     seen[k] = hx_plane_add(step->plane[k], shift[k]);
     z[k] = step->height[k];
-    hx_posture_see_place(&step->posture, &seen[k], &z[k]);
+    hx_posture_to_torso(&step->posture, &seen[k], &z[k]);
   }
   hx_leg_solver_poses(leg, (const hxPlane *)seen, (const double *)z, step->pose);
 }
@@ -79,17 +79,17 @@ static inline void stand(const hxStepPlanner *model, const hxGaitClock *clock,
                          const double presence[HX_LEGS], hxPlannedStep *step) {
   memcpy(step->activation, presence, sizeof step->activation);
   for (int k = 0; k < HX_LEGS; ++k) step->plane[k] = hx_plane_sub(step->feet.plane[k], step->torso);
-  if (model->compliant) {
-    hx_compliant_lowered(&model->laws, clock, step->feet.phase, step->plane, step->activation,
+  if (model->is_compliant) {
+    hx_compliant_lowered(&model->compliant, clock, step->feet.phase, step->plane, step->activation,
                          step->lowering);
   } else {
     memset(step->lowering, 0, sizeof step->lowering);
   }
   for (int k = 0; k < HX_LEGS; ++k) step->height[k] = step->feet.height[k] - step->lowering[k];
   place_legs(model->leg, step);
-  if (!model->compliant) return;
+  if (!model->is_compliant) return;
   const hxPlane turn = hx_cis(step->feet.turn);
-  hx_inverse_dynamics_place(&model->laws.dynamics, model->leg, step->pose,
+  hx_inverse_dynamics_place(&model->compliant.dynamics, model->leg, step->pose,
                             hx_plane_add(step->feet.way, hx_times(turn, step->torso)), turn,
                             &step->posture, &step->masses);
 }
@@ -97,29 +97,30 @@ static inline void stand(const hxStepPlanner *model, const hxGaitClock *clock,
 /* Computes way of the torso, poses of the legs and point masses for planned feet. clock: of the
  * gait, in the section of the step; ahead: periods from the present step. */
 static inline void hx_step_planner_lay_out(const hxStepPlanner *model, const hxGaitClock *clock,
-                                           const hxCompliant *laws, const hxAbsenceModel *absent,
-                                           const hxAbsence *absence, int64_t ahead,
-                                           hxPlannedStep *step) {
+                                           const hxCompliant *compliant,
+                                           const hxAbsenceModel *absent, const hxAbsence *absence,
+                                           int64_t ahead, hxPlannedStep *step) {
   const hxSway *sway = &model->sway;
-  const double narrowing = laws->adaptation.narrowing;
+  const double narrowing = compliant->adaptation.narrowing;
   const hxPlane away = hx_absence_torso(absent, absence, ahead);
   double presence[HX_LEGS];
   for (int k = 0; k < HX_LEGS; ++k) presence[k] = hx_absence_presence(absent, absence, k, ahead);
   step->torso = away;
-  if (model->compliant && hx_sway_acts(sway, narrowing)) {
-    const double laden = hx_load_adaptation_laden(&laws->adaptation);
+  if (model->is_compliant && hx_sway_acts(sway, narrowing)) {
+    const double laden = hx_load_adaptation_laden(&compliant->adaptation);
     step->torso = hx_sway_guess(sway, &step->feet, laden);
     stand(model, clock, presence, step);
-    step->torso = hx_plane_add(
-        away, hx_scaled(hx_sway_of(sway, &model->laws.dynamics, step->torso, &step->masses, laden),
-                        narrowing));
+    step->torso = hx_plane_add(away, hx_scaled(hx_sway_of(sway, &model->compliant.dynamics,
+                                                          step->torso, &step->masses, laden),
+                                               narrowing));
   }
   stand(model, clock, presence, step);
 }
 
 /* Returns the weight that moves with the torso over the modelled one [1] (C53). */
-static inline double hx_step_planner_laden(const hxStepPlanner *model, const hxCompliant *laws) {
-  return model->sway.active ? hx_load_adaptation_laden(&laws->adaptation) : 1.0;
+static inline double hx_step_planner_laden(const hxStepPlanner *model,
+                                           const hxCompliant *compliant) {
+  return model->sway.active ? hx_load_adaptation_laden(&compliant->adaptation) : 1.0;
 }
 
 #endif

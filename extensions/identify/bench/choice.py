@@ -24,7 +24,7 @@ class Choice:
     model: str
     fit: ServoFit  # to all logs
     held_out: tuple[tuple[BenchLog, Errors], ...]  # each log, by a fit that did not see its group
-    models: dict[str, Errors]  # means on the logs of one group that was held out
+    models: dict[str, Errors]  # means over the held-out logs, of all models that were compared
 
 
 def splits(logs: Sequence[BenchLog], by: str) -> list[Split]:
@@ -67,26 +67,20 @@ def choose(
         models: that are compared, from the one with the fewest terms on.
         progress: called when a step begins.
     """
-    parts = splits(logs, by)
-    fits = {}
-    if len(models) > 1:
-        progress(f"{len(models)} models, judged without one {by}")
-        found = fitted_and_judged(*parts[len(parts) // 2], robot, models)
-        fits = {model: Errors.mean(own) for model, own in found.items()}
-    model = next(
-        key
-        for key in models
-        if not fits or fits[key].angle <= (1.0 + WORTH) * min(one.angle for one in fits.values())
+    seen, unseen = zip(*splits(logs, by), strict=True)
+    progress(f"{', '.join(models)}: {len(seen)} times without one {by}")
+    found = list(pool.map(fitted_and_judged, seen, unseen, repeat(robot), repeat(models)))
+    errors = {key: [error for own in found for error in own[key]] for key in models}
+    fits = {key: Errors.mean(own) for key, own in errors.items()}
+    best = min(one.angle for one in fits.values())
+    model = next(key for key in models if fits[key].angle <= (1.0 + WORTH) * best)
+    progress(f"{model}, all logs")
+    return Choice(
+        model=model,
+        fit=fit_servo(logs, robot, model),
+        held_out=tuple(zip([log for own in unseen for log in own], errors[model], strict=True)),
+        models=fits,
     )
-    progress(f"{model}, all logs and {len(parts)} times without one {by}")
-    seen_parts, unseen_parts = zip(*parts, strict=True)
-    errors = pool.map(fitted_and_judged, seen_parts, unseen_parts, repeat(robot), repeat([model]))
-    whole = fit_servo(logs, robot, model)  # here, while the pool judges
-    pairs = [
-        pair for own, one in zip(unseen_parts, errors, strict=True)
-        for pair in zip(own, one[model], strict=True)
-    ]  # fmt: skip
-    return Choice(model=model, fit=whole, held_out=tuple(pairs), models=fits)
 
 
 def fitted_and_judged(

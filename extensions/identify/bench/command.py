@@ -97,7 +97,7 @@ def result_table(found: Choice) -> dict[str, Any]:
     return {
         "model": found.model,
         "models": {key: asdict(one) for key, one in found.models.items()},
-        "held_out": asdict(Errors.mean([one for _, one in found.held_out])),
+        "held_out": asdict(found.models[found.model]),
         "logs": {log.where: asdict(one) for log, one in found.held_out},
         "numbers": {
             key: {"value": value, "start": fit.before[key], "interval": fit.interval(key)}
@@ -117,9 +117,8 @@ def number_rows(found: Choice) -> list[list[str]]:
 
 
 def error_rows(found: Choice) -> list[list[str]]:
-    """Returns the rows of a table of models, or of the one that was fitted, with ERRORS."""
-    table = found.models or {found.model: Errors.mean([one for _, one in found.held_out])}
-    return [[key, *error_texts(one)] for key, one in table.items()]
+    """Returns the rows of a table of models with ERRORS."""
+    return [[key, *error_texts(one)] for key, one in found.models.items()]
 
 
 def error_texts(one: Errors) -> list[str]:
@@ -129,8 +128,8 @@ def error_texts(one: Errors) -> list[str]:
 
 def worth(found: Choice, by: str) -> str:
     """Returns which model is worth it and what it errs by, as a sentence."""
-    error = Errors.mean([one for _, one in found.held_out])
-    compared = "the simplest model within 5 % of the best, and " if found.models else ""
+    error = found.models[found.model]
+    compared = "the simplest model within 5 % of the best, and " if len(found.models) > 1 else ""
     return (
         f"{found.model} is {compared}fitted to {len(found.held_out)} logs: held out by {by} in "
         f"turn it errs by {error.angle:.2f} degrees, {error.speed:.2f} rad/s and "
@@ -153,7 +152,7 @@ def servo_table(found: Choice, by: str) -> dict[str, Any]:
     """Returns the [servo] section of a robot file with the servo that was found."""
     servo, logs = found.fit.robot.servo, [log for log, _ in found.held_out]
     largest = max(logs, key=lambda log: log.gain)
-    error = Errors.mean([one for _, one in found.held_out])
+    error = found.models[found.model]
     changed = [key for key in FOUND if getattr(servo, key) != getattr(Servo, key, None)]
     table = tomlkit.table()
     table.comment(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.identify.bench.log import BenchLog
-from hexapod_cosim.extensions.identify.bench.pendulum import Bench, Swing, stacked
+from hexapod_cosim.extensions.identify.bench.pendulum import STEP, Bench, Swing, stacked
 from hexapod_cosim.extensions.identify.fitting.covariance import Series, coloured_information
 from hexapod_cosim.extensions.identify.fitting.least_squares import damped_step, huber
 from hexapod_cosim.extensions.identify.numbers import Unknown, section
@@ -20,14 +20,15 @@ Array = NDArray[np.float64]
 # rad  of an angle, some encoder steps: nearly all residuals count linearly, as in the errors that
 # a fit is judged by; with squares few long deviations of one log would choose the servo
 NOISE = 0.004
-STEP = 1e-3  # priors  of the differences
-STEPS = 40  # of the optimiser
+APART = 1e-3  # priors  between the points of a derivative
 DAMPINGS = (0.0, 30.0, 1e3, 3e4, 1e6)  # of its steps [1/prior^2]
+TRIED = len(DAMPINGS)
 ENOUGH = 2e-4  # relative change of the sum of squares at which a search ends
-COARSE = 0.003  # s  of the search's steps
+# of the search: length [s] of the simulation's steps and most steps of the optimiser, first from
+# all starts, then from the best place
+STAGES = ((0.005, 25), (0.003, 40), (STEP, 2))
 SEEDS = 3  # starts of the search
 SPREAD = 1.0  # priors  of the further starts
-SHORT = 25  # steps from each start, before the best one is finished
 QUANTILE = 1.959963985  # of a normal distribution, for 95 %
 OFFSET, DELAY = "bench.offset", "bench.delay"
 BENCH = (
@@ -98,23 +99,24 @@ class _Problem:
             robot = row.write(robot, values[row.key])
         return robot
 
-    def residuals(self, z: Array) -> Array:
-        return np.concatenate([self.errors(z[None])[:, 0].ravel(), z])
+    def residuals(self, points: Array) -> list[Array]:
+        """Returns those of each of some points (points, numbers)."""
+        errors = self.errors(points)
+        return [np.concatenate([errors[:, k].ravel(), z]) for k, z in enumerate(points)]
 
-    def slopes(self, z: Array) -> Array:
-        """Returns the derivatives of the errors (rows, logs, numbers)."""
-        steps = np.where(z + STEP > self.bounds()[1], -STEP, STEP)
-        errors = self.errors(np.vstack([z, z + np.diag(steps)]))
-        found = (errors[:, 1:] - errors[:, :1]) / steps[:, None]
-        return np.moveaxis(found, 1, 2)
+    def slopes(self, places: Sequence[Array]) -> list[Array]:
+        """Returns the derivatives of the errors (rows, logs, numbers) at each of some places."""
+        high = self.bounds()[1]
+        steps = [np.where(z + APART > high, -APART, APART) for z in places]
+        points = [z + np.vstack([0.0 * z, np.diag(h)]) for z, h in zip(places, steps, strict=True)]
+        errors = np.moveaxis(self.errors(np.concatenate(points)), 1, 2)
+        found = np.split(errors, len(places), axis=2)
+        return [(own[..., 1:] - own[..., :1]) / h for own, h in zip(found, steps, strict=True)]
 
-    def jacobian(self, z: Array) -> Array:
-        slopes = self.slopes(z)
-        return np.vstack([slopes.reshape(-1, len(z)), np.eye(len(z))])
-
-    def cost(self, z: Array) -> float:
-        """Returns what a search lowers."""
-        return huber(self.residuals(z))
+    def jacobians(self, places: Sequence[Array]) -> list[Array]:
+        """Returns the derivatives of the residuals (residuals, numbers) at each of some places."""
+        size = len(self.rows)
+        return [np.vstack([own.reshape(-1, size), np.eye(size)]) for own in self.slopes(places)]
 
     def place(self, fit: ServoFit) -> Array:
         """Returns the numbers (numbers,) at which the servo is that of a fit."""
@@ -156,14 +158,15 @@ def fit_servo(
         return known[model]
     start = robot if model is None else with_friction_model(robot, model)
     rows = BENCH if model is None else unknowns(start)
-    problem, found = _Problem(Bench(logs, step=COARSE), start, rows), []
+    problem = _Problem(Bench(logs), start, rows)
+    starts = problem.starts(seeds)
     if model in SIMPLER:
         simpler = fit_servo(logs, robot, SIMPLER[model], seeds=seeds, known=known)
-        found.append(problem.place(simpler))
-        found.append(_searched(problem, found[0], SHORT))
-    found += [_searched(problem, z, SHORT) for z in problem.starts(seeds)]
-    problem.bench = Bench(logs)
-    z = _searched(problem, min(found, key=problem.cost), STEPS)
+        starts.append(problem.place(simpler))
+    for length, steps in STAGES:
+        problem.bench = Bench(logs, step=length)
+        starts = [_searched(problem, starts, steps)]
+    (z,) = starts
     known[model] = ServoFit(
         robot=problem.changed(_values(rows, problem.before, z)),
         rows=tuple(rows),
@@ -176,7 +179,7 @@ def fit_servo(
 
 def _covariance(problem: _Problem, z: Array) -> Array:
     """Returns the covariance of the numbers (rows, rows), with the spectra of each log's errors."""
-    errors, slopes = problem.errors(z[None])[:, 0], problem.slopes(z)
+    errors, (slopes,) = problem.errors(z[None])[:, 0], problem.slopes([z])
     series = [
         Series(errors[:, k : k + 1], slopes[:, k : k + 1], float(np.mean(own)))
         for k, own in enumerate(problem.bench.counted.T)
@@ -184,29 +187,33 @@ def _covariance(problem: _Problem, z: Array) -> Array:
     return np.asarray(np.linalg.inv(coloured_information(series) + np.eye(len(z))))
 
 
-def _searched(problem: _Problem, z: Array, steps: int) -> Array:
-    """Returns the numbers of the least sum of squares near a start.
+def _searched(problem: _Problem, starts: Sequence[Array], steps: int) -> Array:
+    """Returns the numbers of the least sum of squares near some starts.
 
-    The steps are Levenberg and Marquardt's; several dampings are simulated at once.
+    The steps are Levenberg and Marquardt's; several dampings and all starts are simulated at once.
     """
     bounds = problem.bounds()
-    residuals = problem.residuals(z)
+    places, residuals = list(starts), problem.residuals(np.array(starts))
+    moving = list(range(len(places)))
     for _ in range(steps):
-        cost, jacobian = huber(residuals), problem.jacobian(z)
+        if not moving:
+            break
+        jacobians = problem.jacobians([places[k] for k in moving])
         points = np.array([
-            np.clip(z + damped_step(jacobian, residuals, z, bounds, damping), *bounds)
-            for damping in DAMPINGS
+            np.clip(places[k] + damped_step(own, residuals[k], places[k], bounds, damping), *bounds)
+            for k, own in zip(moving, jacobians, strict=True) for damping in DAMPINGS
         ])  # fmt: skip
-        errors = problem.errors(points)
-        found = [np.concatenate([errors[:, k].ravel(), own]) for k, own in enumerate(points)]
-        costs = [huber(one) for one in found]
-        best = int(np.argmin(costs))
-        if not costs[best] < cost:
-            break
-        z, residuals = points[best], found[best]
-        if costs[best] > (1.0 - ENOUGH) * cost:
-            break
-    return z
+        found = problem.residuals(points)
+        ahead = []
+        for number, k in enumerate(moving):
+            costs = [huber(one) for one in found[number * TRIED : (number + 1) * TRIED]]
+            best, before = int(np.argmin(costs)), huber(residuals[k])
+            if costs[best] < before:
+                places[k], residuals[k] = (own[number * TRIED + best] for own in (points, found))
+            if costs[best] < (1.0 - ENOUGH) * before:
+                ahead.append(k)
+        moving = ahead
+    return places[int(np.argmin([huber(one) for one in residuals]))]
 
 
 def unknowns(robot: Robot) -> Sequence[Unknown]:

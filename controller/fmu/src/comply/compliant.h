@@ -7,7 +7,7 @@
 #include "../walk/gait_clock.h"
 #include "../walk/hold.h"
 #include "../walk/swing.h"
-#include "compliance.h"
+#include "force_laws.h"
 #include "planned_squeeze.h"
 #include "support.h"
 #include <string.h>
@@ -19,7 +19,7 @@ typedef struct hxCompliantModel {
   hxInverseDynamics dynamics;
   hxSupport support;
   hxPlannedSqueeze squeeze;
-  hxComplianceModel laws;
+  hxForceLawsModel laws;
   hxHoldModel hold;
   hxLoadAdaptationModel adaptation;
 } hxCompliantModel;
@@ -32,7 +32,7 @@ typedef struct hxSteering {
 } hxSteering;
 
 typedef struct hxCompliant {
-  hxCompliance laws;
+  hxForceLaws laws;
   hxHold hold;
   hxLoadAdaptation adaptation;
   hxSteering steering;
@@ -101,7 +101,7 @@ static inline void hx_compliant_compile(const hxControllerDefinition *definition
   const hxNeighbours motion = {{NULL, &masses, NULL}, {NULL, pose, NULL}};
   hx_inverse_dynamics_demand(&model->dynamics, leg, &motion, still, &level, 1.0, &rest);
   hx_support_compile(definition, &rest, &model->support);
-  hx_compliance_compile(definition, -model->dynamics.floor, &model->laws);
+  hx_force_laws_compile(definition, -model->dynamics.floor, &model->laws);
   hx_planned_squeeze_compile(definition, model->laws.weight, -model->dynamics.floor,
                              &model->squeeze);
   hx_hold_compile(definition, &model->hold);
@@ -113,7 +113,7 @@ static inline void hx_compliant_compile(const hxControllerDefinition *definition
 
 static inline void hx_compliant_reset(const hxCompliantModel *model, hxCompliant *compliant) {
   memset(compliant, 0, sizeof *compliant);
-  hx_compliance_reset(&compliant->laws);
+  hx_force_laws_reset(&compliant->laws);
   hx_load_adaptation_reset(&model->adaptation, &compliant->adaptation);
 }
 
@@ -183,7 +183,7 @@ static inline void look(const hxCompliantModel *model, const hxLegSolver leg[HX_
                         hxCompliant *compliant) {
   const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
                z = input->quaternion[3];
-  hxSight seen;
+  hxHoldInput seen;
   double foot[3];
   for (int k = 0; k < HX_LEGS; ++k) {
     const double *angle = input->angle[k];
@@ -205,7 +205,7 @@ static inline void look(const hxCompliantModel *model, const hxLegSolver leg[HX_
   seen.yaw = hx_arc(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
   seen.velocity = hx_plane(present->value[0], present->value[1]);
   seen.yaw_rate = present->value[2];
-  hx_hold_look(&model->hold, &seen, &compliant->hold);
+  hx_hold_update(&model->hold, &seen, &compliant->hold);
 }
 
 /* --------------------------------------------------------------------------------------- step */
@@ -222,10 +222,10 @@ static inline void correct(const hxLegSolver *leg, const double climb[HX_JOINTS]
 static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
                                      const hxPresentStep *present, const hxControllerInput *input,
                                      hxCompliant *compliant, hxControllerOutput *output) {
-  hxCompliance *laws = &compliant->laws;
+  hxForceLaws *laws = &compliant->laws;
   double force[HX_LEGS][3];
   hx_sense(input, present->posture, force);
-  hx_compliance_step(&model->laws, &present->load, force, laws);
+  hx_force_laws_step(&model->laws, &present->load, force, laws);
   if (compliant->count % model->hold.every == 0) {
     if (laws->trust.level == 1.0)
       look(model, leg, present, input, compliant);
@@ -234,7 +234,7 @@ static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegS
   }
   ++compliant->count;
   int busy;
-  const double *offsets = hx_compliance_raised(laws, &busy);
+  const double *offsets = hx_force_laws_raised(laws, &busy);
   for (int k = 0; k < HX_LEGS; ++k) {
     const double offset = offsets[k], raised = offset + compliant->hold.lift[k];
     correct(&leg[k], present->climb[k], raised, output->angle_ref[k]);
@@ -253,8 +253,8 @@ static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegS
     output->lift[k] = raised;
   }
   if (busy || compliant->moving) compliant->moving = busy;
-  const double needed = hx_compliance_needed(&model->laws, laws);
-  hx_load_adaptation_weigh(&model->adaptation, hx_compliance_heft(laws), &compliant->adaptation);
+  const double needed = hx_force_laws_needed(&model->laws, laws);
+  hx_load_adaptation_weigh(&model->adaptation, hx_force_laws_heft(laws), &compliant->adaptation);
   hx_load_adaptation_step(&model->adaptation, (const double (*)[HX_JOINTS])laws->torque, needed,
                           laws->held, &compliant->adaptation);
 }

@@ -47,8 +47,8 @@ typedef struct hxPaperStep {
 
 /* 1, of the weight: what a foot carries beyond is not taken back */
 static const double largest_part = 0.5;
-static const double weight_time = 0.5; /* s, smoothing of the sum of all loads */
-static const double touch_part = 0.02; /* 1, of the weight: a foot with more stands */
+static const double weight_time = 0.5;   /* s, smoothing of the sum of all loads */
+static const double contact_part = 0.02; /* 1, of the weight: a foot with more stands */
 /* 1, of the weight: with less in all, the force of some foot is not reported */
 static const double whole_part = 0.9;
 /* 1, added to the spread of the standing feet, for the tilt of the torso */
@@ -88,8 +88,9 @@ static inline void hx_paper_compile(const hxControllerDefinition *definition, hx
 
 /* Updates the torso's sag and the return of the feet by the standing feet (C26, C47). load:
  * smoothed normal forces [N]. */
-static inline void see_torso(const hxPaperModel *model, const hxLegSolver leg[HX_LEGS],
-                             const hxPaperStep *step, const double load[HX_LEGS], hxPaper *paper) {
+static inline void update_torso(const hxPaperModel *model, const hxLegSolver leg[HX_LEGS],
+                                const hxPaperStep *step, const double load[HX_LEGS],
+                                hxPaper *paper) {
   double part[HX_LEGS], sunk[HX_LEGS], total = 0.0, mean = 0.0, spread = 0.0;
   hxPlane feet[HX_LEGS], centre = {0.0, 0.0}, astray = {0.0, 0.0};
   hxPlane skew = {0.0, 0.0}, moment = {0.0, 0.0}, slope = {0.0, 0.0};
@@ -160,15 +161,15 @@ static inline void lift_swinging(const hxPaperModel *model, const double planned
 static inline void suspend(const hxPaperModel *model, const hxPaperStep *step, double total, int k,
                            hxPaper *paper) {
   const double h = model->period, force = step->force[k][2];
-  const int touching = force > fmax(touch_part * paper->weight, least_load);
+  const int contact = force > fmax(contact_part * paper->weight, least_load);
   const int swinging = step->swinging[k];
   /* the damper yields to the force beyond the share of a foot */
   const double rate = (force - paper->weight / HX_LEGS) / model->damping;
-  const int missing = !touching && !swinging && total >= whole_part * paper->weight;
+  const int missing = !contact && !swinging && total >= whole_part * paper->weight;
   paper->late[k] = missing ? paper->late[k] + h : 0.0;
   if (paper->late[k] > late_time)
     paper->yielded[k] += h * hx_clamp(rate, -search_speed, 0.0);
-  else if (swinging && touching)
+  else if (swinging && contact)
     paper->yielded[k] +=
         h * hx_clamp(rate, 0.0, step->height[k] > early_height ? fmax(-step->rise[k], 0.0) : 0.0);
   else
@@ -187,7 +188,7 @@ static inline void hx_paper_step(const hxPaperModel *model, const hxLegSolver le
     total += fmax(step->force[k][2], 0.0);
   }
   paper->weight += (paper->weight > 0.0 ? model->weighing : 1.0) * (total - paper->weight);
-  see_torso(model, leg, step, load, paper);
+  update_torso(model, leg, step, load, paper);
   for (int k = 0; k < HX_LEGS; ++k) {
     const int swinging = step->swinging[k];
     const hxSoftness soft = hx_leg_solver_softness(&leg[k], &step->pose[k], model->servo_stiffness);

@@ -40,33 +40,33 @@ static inline double faded(double offset, double period) {
 
 /* Returns the next offset of a foot that has missed the ground for a time, and for which the gait
  * clock has waited [s]. */
-static inline double moved(double offset, double late, double waited, double period, int touching,
+static inline double moved(double offset, double late, double waited, double period, int contact,
                            double falling, int swinging) {
   const double part = fmin(waited / patience, 1.0), eager = part * part,
                pace = reach_speed * (late > grace ? 1.0 : eager * eager);
   if (waited > 0.0 || late > grace) return fmax(offset - pace * period, -hx_reach_limit);
-  if (swinging && touching && falling > 0.0) return fmin(offset + falling, hold_limit);
-  if (swinging && !touching) return faded(offset, period);
+  if (swinging && contact && falling > 0.0) return fmin(offset + falling, hold_limit);
+  if (swinging && !contact) return faded(offset, period);
   return offset;
 }
 
-/* Advances by one period [s] (C36). touching: feet that report a force; falling: distance by which
+/* Advances by one period [s] (C36). contact: feet that report a force; falling: distance by which
  * the path of a foot that met the ground early moves down in this period [m], 0 for the others;
  * swinging: legs planned in the air; loaded: legs planned to carry their whole share; searching:
  * feet that the gait clock waits for; misled: feet whose sensors have just been doubted. */
-static inline void hx_touchdown_step(double period, const int touching[HX_LEGS],
+static inline void hx_touchdown_step(double period, const int contact[HX_LEGS],
                                      const double falling[HX_LEGS], const int swinging[HX_LEGS],
                                      const int loaded[HX_LEGS], const int searching[HX_LEGS],
                                      const int misled[HX_LEGS], hxTouchdown *touchdown) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int misses = loaded[leg] && !touching[leg] && !misled[leg];
+    const int misses = loaded[leg] && !contact[leg] && !misled[leg];
     const double offset = touchdown->offset[leg];
     touchdown->late[leg] = misses ? touchdown->late[leg] + period : 0.0;
     touchdown->waited[leg] = searching[leg] ? touchdown->waited[leg] + period : 0.0;
     touchdown->offset[leg] = misled[leg]
                                  ? faded(offset, period)
                                  : moved(offset, touchdown->late[leg], touchdown->waited[leg],
-                                         period, touching[leg], falling[leg], swinging[leg]);
+                                         period, contact[leg], falling[leg], swinging[leg]);
   }
 }
 
@@ -95,25 +95,25 @@ static inline void hx_landings_reset(hxLandings *landings) {
 }
 
 /* Advances by one period. height: of the paths above their ends [m]. */
-static inline void hx_landings_look(const int touching[HX_LEGS], const double height[HX_LEGS],
-                                    const int swinging[HX_LEGS], hxLandings *landings) {
+static inline void hx_landings_update(const int contact[HX_LEGS], const double height[HX_LEGS],
+                                      const int swinging[HX_LEGS], hxLandings *landings) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    if (touching[leg] && landings->flew[leg]) {
+    if (contact[leg] && landings->flew[leg]) {
       if (isfinite(landings->met[leg])) landings->before[leg] = landings->met[leg];
       landings->met[leg] = swinging[leg] ? fmax(height[leg], 0.0) : 0.0;
     }
-    landings->flew[leg] = (landings->flew[leg] || swinging[leg]) && !touching[leg];
+    landings->flew[leg] = (landings->flew[leg] || swinging[leg]) && !contact[leg];
   }
 }
 
 /* Computes the height at which each foot meets the ground without a bump (C35) [m]; 0 while it is
  * unknown. */
-static inline void hx_landings_expected(const hxLandings *landings, const int touching[HX_LEGS],
+static inline void hx_landings_expected(const hxLandings *landings, const int contact[HX_LEGS],
                                         const double height[HX_LEGS], const int swinging[HX_LEGS],
                                         double expected[HX_LEGS]) {
   double known[HX_LEGS];
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    known[leg] = swinging[leg] && !touching[leg] ? fmax(height[leg], 0.0) : landings->met[leg];
+    known[leg] = swinging[leg] && !contact[leg] ? fmax(height[leg], 0.0) : landings->met[leg];
   for (int leg = 0; leg < HX_LEGS; ++leg)
     expected[leg] = fmax(least_of_others(known, leg), landings->before[leg]);
 }

@@ -43,8 +43,8 @@ static const double airborne_time = 0.06;
 static const double absent_time = 0.10;
 static const double missing_share = 0.92; /* 1  of the weight */
 static const double memory_cycles = 1.5;  /* 1  gait cycles */
-/* 1, of the weight: as touch_share and lift_share, for a doubted foot; more, because torso and feet
- * accelerate */
+/* 1, of the weight: as contact_share and lift_share, for a doubted foot; more, because torso and
+ * feet accelerate */
 static const double found_part = 0.10, gone_part = 0.03;
 /* N, of a doubted foot, so that the shares of feet in the air are not 0 / 0 */
 static const double least_share = 1e-6;
@@ -96,16 +96,16 @@ static inline int hx_sensor_watch_busy(const hxSensorWatch *watch) {
   return busy;
 }
 
-/* Advances by one period. touching: feet that report a force; total: the sum of all normal forces,
+/* Advances by one period. contact: feet that report a force; total: the sum of all normal forces,
  * for each foot [N]; standing: planned to carry their whole share; high: planned well above the
  * ground. */
-static inline void hx_sensor_watch_look(const hxSensorWatchModel *model,
-                                        const int touching[HX_LEGS], const double total[HX_LEGS],
-                                        const int standing[HX_LEGS], const int high[HX_LEGS],
-                                        hxSensorWatch *watch) {
+static inline void hx_sensor_watch_update(const hxSensorWatchModel *model,
+                                          const int contact[HX_LEGS], const double total[HX_LEGS],
+                                          const int standing[HX_LEGS], const int high[HX_LEGS],
+                                          hxSensorWatch *watch) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const int up = high[leg], missing = total[leg] < model->missing;
-    const int wrong = (touching[leg] && up) || (missing && standing[leg] && !touching[leg]);
+    const int wrong = (contact[leg] && up) || (missing && standing[leg] && !contact[leg]);
     watch->contradicted[leg] = wrong ? watch->contradicted[leg] + model->period : 0.0;
     const int too_long = watch->contradicted[leg] > (up ? airborne_time : absent_time);
     watch->left[leg] = too_long ? model->memory : fmax(watch->left[leg] - model->period, 0.0);
@@ -113,22 +113,21 @@ static inline void hx_sensor_watch_look(const hxSensorWatchModel *model,
 }
 
 /* Returns whether a doubted foot has contact (C34). load: that replaces the measured one [N];
- * touching: a period ago. */
-static inline int hx_sensor_watch_found(const hxSensorWatchModel *model, double load,
-                                        int touching) {
-  return load > (touching ? gone_part : found_part) * model->weight;
+ * contact: a period ago. */
+static inline int hx_sensor_watch_found(const hxSensorWatchModel *model, double load, int contact) {
+  return load > (contact ? gone_part : found_part) * model->weight;
 }
 
 /* Replaces the normal forces of the doubted feet, of which there is one at least (C34): they carry
  * what the others leave of the weight, in the shares of the plan. planned, scale: normal forces [N]
- * and the ratio of measured to planned weight; touching: feet that report a force. */
+ * and the ratio of measured to planned weight; contact: feet that report a force. */
 static inline void hx_replaced(const double planned[HX_LEGS], double scale,
-                               const int touching[HX_LEGS], const int doubted[HX_LEGS],
+                               const int contact[HX_LEGS], const int doubted[HX_LEGS],
                                double force[HX_LEGS][3]) {
   double left = 0.0, whole = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double load = scale * planned[leg];
-    left += load - (touching[leg] && !doubted[leg] ? force[leg][2] : 0.0);
+    left += load - (contact[leg] && !doubted[leg] ? force[leg][2] : 0.0);
     whole += doubted[leg] ? load + least_share : 0.0;
   }
   for (int leg = 0; leg < HX_LEGS; ++leg)

@@ -16,7 +16,7 @@ typedef struct hxHoldModel {
 } hxHoldModel;
 
 /* Measurements for one update. Feet are in the walking frame. */
-typedef struct hxSight {
+typedef struct hxHoldInput {
   hxPlane plane[HX_LEGS];         /* m, contact points from the measured joint angles */
   double height[HX_LEGS];         /* m, of the feet's centres */
   hxPlane planned[HX_LEGS];       /* m, planned positions */
@@ -26,7 +26,7 @@ typedef struct hxSight {
   double yaw;                     /* rad */
   hxPlane velocity;               /* m/s  commanded, walking frame */
   double yaw_rate;                /* rad/s */
-} hxSight;
+} hxHoldInput;
 
 typedef struct hxHold {
   double lift[HX_LEGS]; /* m      of the feet */
@@ -49,7 +49,7 @@ static const double whole_turn = 6.283185307179586; /* rad */
 
 /* Fits the plane height = c + s_x x + s_y y of least weighted squares (C37): fit = c, s_x, s_y.
  * Returns whether the feet define a plane. */
-static inline int fit_plane(const hxSight *seen, double fit[3]) {
+static inline int fit_plane(const hxHoldInput *seen, double fit[3]) {
   double total = 0.0, x0 = 0.0, y0 = 0.0, z0 = 0.0, xx = 0.0, yy = 0.0, xy = 0.0, xz = 0.0,
          yz = 0.0;
   int feet = 0;
@@ -102,7 +102,7 @@ static inline void hx_hold_compile(const hxControllerDefinition *definition, hxH
 }
 
 /* Integrates the errors of height and tilt relative to the ground (C38). */
-static inline void hold_posture(const hxHoldModel *model, const hxSight *seen, hxHold *hold) {
+static inline void hold_posture(const hxHoldModel *model, const hxHoldInput *seen, hxHold *hold) {
   double fit[3];
   if (!fit_plane(seen, fit)) return;
   /* relative to the planned feet the torso is pitched by s_x and rolled by -s_y */
@@ -124,7 +124,7 @@ static inline void hold_posture(const hxHoldModel *model, const hxSight *seen, h
 
 /* Adds the displacement and heading lost since the last update (C39). foot: turned by the yaw [m].
  */
-static inline void add_lost_way(const hxHoldModel *model, const hxSight *seen,
+static inline void add_lost_way(const hxHoldModel *model, const hxHoldInput *seen,
                                 const hxPlane foot[HX_LEGS], hxHold *hold) {
   const hxPlane ahead = hx_cis(hold->yaw + hold->heading + 0.5 * seen->yaw_rate * model->time);
   const hxPlane commanded = hx_scaled(hx_times(ahead, seen->velocity), model->time);
@@ -142,7 +142,7 @@ static inline void add_lost_way(const hxHoldModel *model, const hxSight *seen,
 }
 
 /* Computes the velocity that leads the robot back to its path (C39, C40). */
-static inline void hold_path(const hxHoldModel *model, const hxSight *seen, hxHold *hold) {
+static inline void hold_path(const hxHoldModel *model, const hxHoldInput *seen, hxHold *hold) {
   const hxPlane turned = hx_cis(seen->yaw);
   hxPlane foot[HX_LEGS];
   for (int leg = 0; leg < HX_LEGS; ++leg) foot[leg] = hx_times(turned, seen->plane[leg]);
@@ -160,7 +160,7 @@ static inline void hold_path(const hxHoldModel *model, const hxSight *seen, hxHo
 }
 
 /* Updates the corrections. */
-static inline void hx_hold_look(const hxHoldModel *model, const hxSight *seen, hxHold *hold) {
+static inline void hx_hold_update(const hxHoldModel *model, const hxHoldInput *seen, hxHold *hold) {
   if (model->posture) hold_posture(model, seen, hold);
   if (model->path) hold_path(model, seen, hold);
 }

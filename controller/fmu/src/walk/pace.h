@@ -85,7 +85,7 @@ static inline double needed(const hxPaceModel *model, const hxStride *stride, in
     double speed[HX_JOINTS];
     hxPose pose;
     hxBends bends;
-    hx_posture_see(&stride->posture, &plane, &height, &velocity, &rise);
+    hx_posture_feet_to_torso(&stride->posture, &plane, &height, &velocity, &rise);
     linkage(leg, plane, height, &pose, &bends);
     hx_leg_solver_speeds(leg, &pose, velocity, rise, speed);
     for (int joint = 0; joint < HX_JOINTS; ++joint) most = hx_larger(fabs(speed[joint]), most);

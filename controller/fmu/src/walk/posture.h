@@ -56,17 +56,17 @@ static inline void hx_posture_turn_back(const hxPosture *posture, hxPlane *plane
 
 /* Transforms position and velocity of a foot from the walking frame to the torso frame, in place.
  */
-static inline void hx_posture_see_place(const hxPosture *posture, hxPlane *plane, double *height) {
+static inline void hx_posture_to_torso(const hxPosture *posture, hxPlane *plane, double *height) {
   /* p_T = R_TK (p_K - height e_z) */
   *height -= posture->height;
   hx_posture_turn_back(posture, plane, height);
 }
 
-static inline void hx_posture_see(const hxPosture *posture, hxPlane *plane, double *height,
-                                  hxPlane *velocity, double *rise) {
+static inline void hx_posture_feet_to_torso(const hxPosture *posture, hxPlane *plane,
+                                            double *height, hxPlane *velocity, double *rise) {
   const double *w = posture->spin;
   if (posture->level) return;
-  hx_posture_see_place(posture, plane, height);
+  hx_posture_to_torso(posture, plane, height);
   /* v_T = R_TK (v_K - rate e_z) - w_T x p_T */
   *rise -= posture->rate;
   hx_posture_turn_back(posture, velocity, rise);

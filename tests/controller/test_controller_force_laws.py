@@ -18,7 +18,7 @@ from twin_motion import HIGH, Motion, Z, velocities
 from hexapod_cosim.controller import BodyCommand, Measurement, Parts
 from hexapod_cosim.controller.comply.compliant import sense
 from hexapod_cosim.controller.gains import LimitGains
-from hexapod_cosim.controller.walk.hold import Sight
+from hexapod_cosim.controller.walk.hold import HoldInput
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.kinematics import axis_quaternion, foot_centres, quaternion_product
 
@@ -72,7 +72,7 @@ def test_the_clock_waits_until_a_foot_bears_a_fifteenth_of_the_weight_at_this_mo
     force = shared(laws)
     force[1, 2] = share * WEIGHT / 3.0
     laws.feel(force)
-    assert laws.touching[1]
+    assert laws.contact[1]
     assert laws.load[1] < 0.05
     assert laws.waits(ONLY_1, waiting=True) == waits
     assert not laws.waits(ONLY_1, waiting=False)  # it does not begin to wait for it
@@ -134,7 +134,7 @@ def test_a_foot_whose_force_is_not_believed_bears_the_load_that_the_others_leave
     dead[:, 2] *= 1.0 + shifted / 5.0
     run(laws, dead, 100)
     assert laws.doubted.tolist() == [False, True, False, False, False, False]
-    assert laws.touching.all()
+    assert laws.contact.all()
     assert laws.load[1] == pytest.approx(0.5 * (1.0 - shifted), rel=0.02)
     assert laws.scale == pytest.approx(1.0, rel=1e-4)  # that before the sensor failed
     assert not laws.fallback.any()
@@ -150,7 +150,7 @@ def test_a_foot_whose_force_is_not_believed_and_bears_no_load_is_in_the_air() ->
     for _ in range(10):
         laws.feel(dead)
     run(laws, dead, 50)
-    assert laws.touching.tolist() == [True, False, True, True, True, True]
+    assert laws.contact.tolist() == [True, False, True, True, True, True]
     assert laws.touchdown.offset[1] < -0.015  # m    it searches for the ground
 
 
@@ -258,9 +258,12 @@ def test_the_forces_on_a_torso_that_leans_as_commanded_are_judged_upright() -> N
 def test_the_slow_loops_see_a_robot_that_does_what_is_planned_where_it_is_planned(
     command: BodyCommand, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    controller, seen = make(compliant=True, parts=Parts(path=False, posture=False)), list[Sight]()
+    controller, seen = (
+        make(compliant=True, parts=Parts(path=False, posture=False)),
+        list[HoldInput](),
+    )
     assert controller.compliant is not None
-    monkeypatch.setattr(controller.compliant.hold, "look", seen.append)
+    monkeypatch.setattr(controller.compliant.hold, "update", seen.append)
     obey(controller, command, 600)
     for sight in seen[-10:]:
         lag = (

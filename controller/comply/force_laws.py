@@ -1,6 +1,6 @@
 """Applies the force laws: turns planned load and measured foot forces into servo torques.
 
-C: compliance.h. Every period consists of these steps:
+C: force_laws.h. Every period consists of these steps:
 
 1. Contacts. The detector decides which feet touch the ground (C23). If a contact contradicts the
    plan, a sensor may be wrong and is replaced (C34), or the ground is higher or lower (C35, C36).
@@ -39,14 +39,14 @@ LARGEST_LEAN = 0.4  # 1    of the depth of the ground: distance of the centre of
 HIGH_SHARE = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
 
 
-class Compliance(Stateful):
+class ForceLaws(Stateful):
     """Force laws of all feet.
 
     Attributes, (6,) unless stated otherwise:
         detector, watch, touchdown, landings, burden, trust: components with states.
         load: smoothed load of the feet in thirds of the weight [1].
         torque: (6, 3) feed-forward torques of the servos [N m].
-        touching: feet on the ground.
+        contact: feet on the ground.
         carrying: feet on the ground that carry so much that the gait clock need not wait for them.
         doubted: sensors that are replaced.
         misled: feet that follow their paths: their sensors have just been doubted, or all are.
@@ -61,7 +61,7 @@ class Compliance(Stateful):
 
     STATE = (
         "detector", "watch", "touchdown", "landings", "burden", "trust", "load", "torque",
-        "touching", "carrying", "doubted", "misled", "fallback", "grip", "regaining", "scale",
+        "contact", "carrying", "doubted", "misled", "fallback", "grip", "regaining", "scale",
         "lean", "held", "sure",
     )  # fmt: skip
 
@@ -106,7 +106,7 @@ class Compliance(Stateful):
         ):  # fmt: skip
             part.reset()
         self.load, self.torque = np.zeros(LEGS), np.zeros((LEGS, 3))
-        self.touching, self.carrying, self.doubted = np.zeros((3, LEGS), np.bool_)
+        self.contact, self.carrying, self.doubted = np.zeros((3, LEGS), np.bool_)
         self.misled, self.fallback = np.zeros((2, LEGS), np.bool_)
         self.grip, self.regaining = np.ones(LEGS), False
         self.scale, self.lean, self.held = 0.0, 0j, 1.0
@@ -125,13 +125,13 @@ class Compliance(Stateful):
 
     def _replace_forces(self, plan: LoadPlan, force: Array) -> Array:
         """Returns the forces (6, 3) [N], with those of doubted sensors replaced (C34)."""
-        before, self.touching = self.touching, self.detector.touching
+        before, self.contact = self.contact, self.detector.contact
         if not self.doubted.any():
             return force
-        force = replaced(force, self.scale * plan.shares.forces(), self.touching, self.doubted)
+        force = replaced(force, self.scale * plan.shares.forces(), self.contact, self.doubted)
         found = self.watch.found(force[:, 2], before)
         found = plan.shares.activation > 0.5 if self.doubted.all() else found
-        self.touching = np.where(self.doubted, found, self.touching)
+        self.contact = np.where(self.doubted, found, self.contact)
         return force
 
     def _judge_sensors(self, plan: LoadPlan, met: Array, force: Array, reported: float) -> None:
@@ -144,7 +144,9 @@ class Compliance(Stateful):
         most = np.maximum(self.share, LIKELY * self.scale * plan.shares.normal)
         known = float(np.minimum(force[:, 2], most)[self.doubted & ~high].sum())
         total = np.where(self.doubted, reported, reported + known)
-        doubted = self.watch.look(self.detector.touching, total, plan.standing | plan.awaited, high)
+        doubted = self.watch.update(
+            self.detector.contact, total, plan.standing | plan.awaited, high
+        )
         blind = np.count_nonzero(doubted) >= TRIPOD_LEGS
         doubted = doubted | blind
         fresh = doubted & ~self.doubted
@@ -160,12 +162,12 @@ class Compliance(Stateful):
         falling = np.where(early, plan.descent, 0.0)
         searching = plan.awaited & ~self.misled & ~self.carrying
         self.touchdown.step(
-            self.touching, falling, plan.swinging, plan.standing, searching, self.misled
+            self.contact, falling, plan.swinging, plan.standing, searching, self.misled
         )
 
     def _examine_contacts(self, plan: LoadPlan, force: Array, reported: float) -> None:
         """Decides between a wrong sensor and an early or late contact; as _judge_sensors()."""
-        met = self.landings.expected(self.touching, plan.height, plan.swinging)
+        met = self.landings.expected(self.contact, plan.height, plan.swinging)
         if self.parts.fallback:
             self._judge_sensors(plan, met, force, reported)
         if self.trust.level < 1.0:
@@ -175,7 +177,7 @@ class Compliance(Stateful):
 
     def _contacts_differ(self, plan: LoadPlan) -> bool:
         """Returns whether contacts contradict the plan, or a response to it is still under way."""
-        wrong = (self.touching != plan.standing) & (plan.standing | (plan.height > EARLY))
+        wrong = (self.contact != plan.standing) & (plan.standing | (plan.height > EARLY))
         return bool((wrong | plan.awaited).any()) or self.watch.busy() or self.touchdown.busy()
 
     # ------------------------------------------------------------------------ inputs and weight
@@ -186,7 +188,7 @@ class Compliance(Stateful):
         deviation: (6,) of the tangential forces from the planned ones [N]. Without planned squeeze
         it is 0.
         """
-        planned = np.where(self.touching, self.scale * plan.shares.squeeze, 0.0)
+        planned = np.where(self.contact, self.scale * plan.shares.squeeze, 0.0)
         whole = float(square(planned).sum())
         if whole <= LOAD_FLOOR:
             return 0.0
@@ -199,8 +201,8 @@ class Compliance(Stateful):
         by the deviations of the tangential forces (C24).
         """
         horizontal = force[:, 0] + 1j * force[:, 1]
-        deviation = np.where(self.touching, horizontal - self.scale * plan.shares.push, 0.0)
-        normal = np.where(self.touching, force[:, 2], 0.0)
+        deviation = np.where(self.contact, horizontal - self.scale * plan.shares.push, 0.0)
+        normal = np.where(self.contact, force[:, 2], 0.0)
         total = float(normal.sum())
         if self.parts.fallback:
             drag = abs(deviation.sum()) / total if total > max(self.settled, LOAD_FLOOR) else 0.0
@@ -250,7 +252,7 @@ class Compliance(Stateful):
         planned load [N m]. Returns the scaled torques (6, 3) [N m].
         """
         grip = self.grip + self.follow_load * (1.0 - self.grip)
-        self.grip = np.where((plan.standing | plan.awaited) & ~self.touching, 0.0, grip)
+        self.grip = np.where((plan.standing | plan.awaited) & ~self.contact, 0.0, grip)
         self.regaining = bool((self.grip < GRIPPED).any())
         return torque * self.grip[:, None]
 
@@ -269,7 +271,7 @@ class Compliance(Stateful):
 
     def meets(self) -> Mask:
         """Returns the feet (6,) that have met the ground on their way down (C51)."""
-        return self.touching & ~self.misled & (self.parts.touchdown and self.trust.level == 1.0)
+        return self.contact & ~self.misled & (self.parts.touchdown and self.trust.level == 1.0)
 
     def waits(self, landing: Mask, *, waiting: bool) -> bool:
         """Returns whether the gait clock waits for the feet of legs that end their swing (C50).
@@ -278,7 +280,7 @@ class Compliance(Stateful):
         """
         if not self.parts.touchdown or self.trust.level < 1.0:
             return False
-        found = self.carrying if waiting else self.touching
+        found = self.carrying if waiting else self.contact
         hopeful = self.touchdown.offset > -REACH_LIMIT
         return bool((landing & ~found & ~self.misled & hopeful).any())
 
@@ -289,8 +291,8 @@ class Compliance(Stateful):
         """
         reported = float(force[self.detector.step(force[:, 2]), 2].sum())
         force = self._replace_forces(plan, force)
-        self.carrying = self.touching & (force[:, 2] > CARRYING_SHARE * self.share)
-        self.landings.look(self.touching, plan.height, plan.swinging)
+        self.carrying = self.contact & (force[:, 2] > CARRYING_SHARE * self.share)
+        self.landings.update(self.contact, plan.height, plan.swinging)
         if self._contacts_differ(plan):
             self._examine_contacts(plan, force, reported)
         normal, total = self._feel(plan, force)

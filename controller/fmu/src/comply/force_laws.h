@@ -1,7 +1,7 @@
-/* compliance.h - the force laws of compliant control: from planned load and measured foot forces to
- * the servos' torques. Python: controller/comply/compliance.py. */
-#ifndef HX_COMPLIANCE_H
-#define HX_COMPLIANCE_H
+/* force_laws.h - the force laws of compliant control: from planned load and measured foot forces to
+ * the servos' torques. Python: controller/comply/force_laws.py. */
+#ifndef HX_FORCE_LAWS_H
+#define HX_FORCE_LAWS_H
 
 #include "../sense/burden.h"
 #include "../sense/contact_detection.h"
@@ -10,7 +10,7 @@
 #include "load_plan.h"
 #include <string.h>
 
-typedef struct hxComplianceModel {
+typedef struct hxForceLawsModel {
   hxParts parts;
   hxSensorWatchModel watch;
   hxBurdenModel burden;
@@ -23,16 +23,16 @@ typedef struct hxComplianceModel {
   /* 1, factors of the smoothings over a period */
   double follow_load, follow_cycle, follow_weight;
   double most; /* N m, limit of the torque */
-} hxComplianceModel;
+} hxForceLawsModel;
 
-typedef struct hxCompliance {
+typedef struct hxForceLaws {
   hxSensorWatch watch;
   hxTouchdown touchdown;
   hxLandings landings;
   hxBurden burden;
   hxTrust trust;
   int felt[HX_LEGS];                 /* the foot's sensor reports a contact */
-  int touching[HX_LEGS];             /* the foot is on the ground */
+  int contact[HX_LEGS];              /* the foot is on the ground */
   int carrying[HX_LEGS];             /* the gait clock need not wait for the foot any longer */
   double load[HX_LEGS];              /* 1    smoothed, in thirds of the weight */
   double torque[HX_LEGS][HX_JOINTS]; /* N m, for the servos */
@@ -47,7 +47,7 @@ typedef struct hxCompliance {
   /* scale, heft and lean before a sensor contradicted the plan */
   double sure_scale, sure_heft;
   hxPlane sure_lean;
-} hxCompliance;
+} hxForceLaws;
 
 /* 1, of the weight: feet that carry less in all have only just met the ground */
 static const double settled_share = 0.5;
@@ -79,8 +79,8 @@ static inline double total_weight(const hxControllerDefinition *d) {
 }
 
 /* depth: of the ground below the torso's origin in the stance [m]. */
-static inline void hx_compliance_compile(const hxControllerDefinition *definition, double depth,
-                                         hxComplianceModel *model) {
+static inline void hx_force_laws_compile(const hxControllerDefinition *definition, double depth,
+                                         hxForceLawsModel *model) {
   const hxGains *gains = &definition->gains;
   const double period = definition->period, cycle = definition->gait.period;
   model->parts = definition->parts;
@@ -99,7 +99,7 @@ static inline void hx_compliance_compile(const hxControllerDefinition *definitio
   model->most = gains->limits.torque;
 }
 
-static inline void hx_compliance_reset(hxCompliance *laws) {
+static inline void hx_force_laws_reset(hxForceLaws *laws) {
   memset(laws, 0, sizeof *laws);
   laws->trust.level = laws->held = laws->sure_scale = laws->sure_heft = 1.0;
   hx_landings_reset(&laws->landings);
@@ -108,11 +108,10 @@ static inline void hx_compliance_reset(hxCompliance *laws) {
 }
 
 /* Returns measured over modelled weight [1] (C32). */
-static inline double hx_compliance_heft(const hxCompliance *laws) { return laws->burden.heft; }
+static inline double hx_force_laws_heft(const hxForceLaws *laws) { return laws->burden.heft; }
 
 /* Returns the torque needed for the measured weight over the torque allowed [1]. */
-static inline double hx_compliance_needed(const hxComplianceModel *model,
-                                          const hxCompliance *laws) {
+static inline double hx_force_laws_needed(const hxForceLawsModel *model, const hxForceLaws *laws) {
   return laws->burden.heft * laws->burden.peak / model->most;
 }
 
@@ -126,31 +125,31 @@ static inline int marks(const int marked[HX_LEGS]) {
 }
 
 /* Replaces the forces of sensors that are not trusted (C34). */
-static inline void replace_forces(const hxComplianceModel *model, const hxLoadPlan *plan,
-                                  double force[HX_LEGS][3], hxCompliance *laws) {
+static inline void replace_forces(const hxForceLawsModel *model, const hxLoadPlan *plan,
+                                  double force[HX_LEGS][3], hxForceLaws *laws) {
   const hxShares *shares = &plan->shares;
   const int count = marks(laws->doubted);
   int before[HX_LEGS];
-  memcpy(before, laws->touching, sizeof before);
-  memcpy(laws->touching, laws->felt, sizeof laws->touching);
+  memcpy(before, laws->contact, sizeof before);
+  memcpy(laws->contact, laws->felt, sizeof laws->contact);
   if (!count) return;
   hx_replaced(shares->normal, laws->scale, laws->felt, laws->doubted, force);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     if (!laws->doubted[leg]) continue;
     force[leg][0] = laws->scale * shares->push[leg].x;
     force[leg][1] = laws->scale * shares->push[leg].y;
-    laws->touching[leg] = count == HX_LEGS
-                              ? shares->activation[leg] > 0.5
-                              : hx_sensor_watch_found(&model->watch, force[leg][2], before[leg]);
+    laws->contact[leg] = count == HX_LEGS
+                             ? shares->activation[leg] > 0.5
+                             : hx_sensor_watch_found(&model->watch, force[leg][2], before[leg]);
   }
 }
 
 /* Decides which sensors are trusted (C34). When the sensors of three feet are not, none is. met:
  * heights at which the feet meet the ground without a bump [m]; force: that the laws use; reported:
  * sum of the normal forces that the sensors report [N]. */
-static inline void judge_sensors(const hxComplianceModel *model, const hxLoadPlan *plan,
+static inline void judge_sensors(const hxForceLawsModel *model, const hxLoadPlan *plan,
                                  const double met[HX_LEGS], const double force[HX_LEGS][3],
-                                 double reported, hxCompliance *laws) {
+                                 double reported, hxForceLaws *laws) {
   int high[HX_LEGS], due[HX_LEGS], count = 0, fresh = 0;
   double total[HX_LEGS], known = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -161,7 +160,7 @@ static inline void judge_sensors(const hxComplianceModel *model, const hxLoadPla
   }
   for (int leg = 0; leg < HX_LEGS; ++leg)
     total[leg] = laws->doubted[leg] ? reported : reported + known;
-  hx_sensor_watch_look(&model->watch, laws->felt, total, due, high, &laws->watch);
+  hx_sensor_watch_update(&model->watch, laws->felt, total, due, high, &laws->watch);
   for (int leg = 0; leg < HX_LEGS; ++leg) count += laws->watch.left[leg] > 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const int blind = count >= HX_TRIPOD_LEGS, doubted = blind || laws->watch.left[leg] > 0.0,
@@ -178,8 +177,8 @@ static inline void judge_sensors(const hxComplianceModel *model, const hxLoadPla
 }
 
 /* Adapts the paths to ground that is met early or late (C36). */
-static inline void meet_ground(const hxComplianceModel *model, const hxLoadPlan *plan,
-                               const double met[HX_LEGS], hxCompliance *laws) {
+static inline void meet_ground(const hxForceLawsModel *model, const hxLoadPlan *plan,
+                               const double met[HX_LEGS], hxForceLaws *laws) {
   double falling[HX_LEGS];
   int early[HX_LEGS], searching[HX_LEGS];
   laws->regaining = 1;
@@ -188,16 +187,16 @@ static inline void meet_ground(const hxComplianceModel *model, const hxLoadPlan 
     falling[leg] = early[leg] ? plan->descent[leg] : 0.0;
     searching[leg] = plan->awaited[leg] && !laws->misled[leg] && !laws->carrying[leg];
   }
-  hx_touchdown_step(model->period, laws->touching, falling, plan->swinging, plan->standing,
+  hx_touchdown_step(model->period, laws->contact, falling, plan->swinging, plan->standing,
                     searching, laws->misled, &laws->touchdown);
 }
 
 /* Decides between a wrong sensor and ground that is met early or late; as for judge_sensors. */
-static inline void examine_contacts(const hxComplianceModel *model, const hxLoadPlan *plan,
+static inline void examine_contacts(const hxForceLawsModel *model, const hxLoadPlan *plan,
                                     const double force[HX_LEGS][3], double reported,
-                                    hxCompliance *laws) {
+                                    hxForceLaws *laws) {
   double met[HX_LEGS];
-  hx_landings_expected(&laws->landings, laws->touching, plan->height, plan->swinging, met);
+  hx_landings_expected(&laws->landings, laws->contact, plan->height, plan->swinging, met);
   if (model->parts.fallback) judge_sensors(model, plan, met, force, reported, laws);
   if (laws->trust.level < 1.0)
     memset(&laws->touchdown, 0, sizeof laws->touchdown);
@@ -206,10 +205,10 @@ static inline void examine_contacts(const hxComplianceModel *model, const hxLoad
 }
 
 /* Returns whether contacts contradict the plan, or have done so and the reaction is in progress. */
-static inline int contacts_differ(const hxLoadPlan *plan, const hxCompliance *laws) {
+static inline int contacts_differ(const hxLoadPlan *plan, const hxForceLaws *laws) {
   int found = hx_sensor_watch_busy(&laws->watch) || hx_touchdown_busy(&laws->touchdown);
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    found |= plan->awaited[leg] || (laws->touching[leg] != plan->standing[leg] &&
+    found |= plan->awaited[leg] || (laws->contact[leg] != plan->standing[leg] &&
                                     (plan->standing[leg] || plan->height[leg] > hx_early));
   return found;
 }
@@ -219,10 +218,10 @@ static inline int contacts_differ(const hxLoadPlan *plan, const hxCompliance *la
 /* Returns the share of the planned squeeze that creep has taken away, in [0, 1] (C46); 0 without
  * planned squeeze. deviation: of the tangential forces from the planned ones [N]. */
 static inline double squeeze_lost(const hxLoadPlan *plan, const hxPlane deviation[HX_LEGS],
-                                  const hxCompliance *laws) {
+                                  const hxForceLaws *laws) {
   double whole = 0.0, present = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    if (!laws->touching[leg]) continue;
+    if (!laws->contact[leg]) continue;
     const hxPlane planned = hx_scaled(plan->shares.squeeze[leg], laws->scale);
     whole += hx_square(planned);
     present += hx_along(planned, deviation[leg]);
@@ -233,17 +232,17 @@ static inline double squeeze_lost(const hxLoadPlan *plan, const hxPlane deviatio
 /* Computes the normal forces and returns their sum [N]. Updates trust (C33), the smoothed loads
  * (C27) and the share of the planned squeeze that is held (C52) by the deviations of the tangential
  * forces (C24). */
-static inline double feel(const hxComplianceModel *model, const hxLoadPlan *plan,
+static inline double feel(const hxForceLawsModel *model, const hxLoadPlan *plan,
                           const double force[HX_LEGS][3], double normal[HX_LEGS],
-                          hxCompliance *laws) {
+                          hxForceLaws *laws) {
   hxPlane common = {0.0, 0.0}, deviation[HX_LEGS];
   double total = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const double touching = laws->touching[leg] ? 1.0 : 0.0;
+    const double contact = laws->contact[leg] ? 1.0 : 0.0;
     const hxPlane planned = hx_scaled(plan->shares.push[leg], laws->scale);
     deviation[leg] =
-        hx_scaled(hx_plane_sub(hx_plane(force[leg][0], force[leg][1]), planned), touching);
-    normal[leg] = force[leg][2] * touching;
+        hx_scaled(hx_plane_sub(hx_plane(force[leg][0], force[leg][1]), planned), contact);
+    normal[leg] = force[leg][2] * contact;
     common = hx_plane_add(common, deviation[leg]);
     total += normal[leg];
   }
@@ -261,8 +260,8 @@ static inline double feel(const hxComplianceModel *model, const hxLoadPlan *plan
 
 /* Updates the distance of the centre of mass from the modelled one (C44). The planned loads contain
  * the present distance. normal: measured [N]; total: their sum. */
-static inline void update_lean(const hxComplianceModel *model, const hxLoadPlan *plan,
-                               const double normal[HX_LEGS], double total, hxCompliance *laws) {
+static inline void update_lean(const hxForceLawsModel *model, const hxLoadPlan *plan,
+                               const double normal[HX_LEGS], double total, hxForceLaws *laws) {
   hxPlane measured = {0.0, 0.0}, planned = {0.0, 0.0};
   if (!(total > model->settled) || !(plan->weight > model->settled)) return;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -278,8 +277,8 @@ static inline void update_lean(const hxComplianceModel *model, const hxLoadPlan 
 
 /* Updates the ratio of measured to planned weight (C30), the centre of mass (C44), and the part of
  * the weight that the servos carry. normal: measured normal forces [N]; total: their sum [N]. */
-static inline void update_weight(const hxComplianceModel *model, const hxLoadPlan *plan,
-                                 const double normal[HX_LEGS], double total, hxCompliance *laws) {
+static inline void update_weight(const hxForceLawsModel *model, const hxLoadPlan *plan,
+                                 const double normal[HX_LEGS], double total, hxForceLaws *laws) {
   const double ratio = total / hx_larger(plan->weight, load_floor),
                scale = hx_clamp(ratio, least_scale, largest_scale);
   if (laws->scale > weighed * laws->burden.heft && !hx_sensor_watch_contradicted(&laws->watch)) {
@@ -299,20 +298,20 @@ static inline void update_weight(const hxComplianceModel *model, const hxLoadPla
 
 /* Takes its share from a leg that does not touch the ground where it should stand, and gives it
  * back gradually once the leg touches (C28). */
-static inline void restore_grip(const hxComplianceModel *model, const hxLoadPlan *plan,
-                                hxCompliance *laws) {
+static inline void restore_grip(const hxForceLawsModel *model, const hxLoadPlan *plan,
+                                hxForceLaws *laws) {
   laws->regaining = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     laws->grip[leg] += model->follow_load * (1.0 - laws->grip[leg]);
-    if ((plan->standing[leg] || plan->awaited[leg]) && !laws->touching[leg]) laws->grip[leg] = 0.0;
+    if ((plan->standing[leg] || plan->awaited[leg]) && !laws->contact[leg]) laws->grip[leg] = 0.0;
     for (int joint = 0; joint < HX_JOINTS; ++joint) laws->torque[leg][joint] *= laws->grip[leg];
     laws->regaining |= laws->grip[leg] < gripped;
   }
 }
 
 /* Sets the torques of the planned load: trust (own + grip strength scale carry) (C29). */
-static inline void actuate(const hxComplianceModel *model, const hxLoadPlan *plan,
-                           hxCompliance *laws) {
+static inline void actuate(const hxForceLawsModel *model, const hxLoadPlan *plan,
+                           hxForceLaws *laws) {
   const int limited = model->parts.limits;
   const double strength = limited ? laws->burden.strength : 1.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
@@ -327,26 +326,26 @@ static inline void actuate(const hxComplianceModel *model, const hxLoadPlan *pla
 }
 
 /* Returns the height offsets of the feet [m] (C36), and in *busy whether they are changing. */
-static inline const double *hx_compliance_raised(const hxCompliance *laws, int *busy) {
+static inline const double *hx_force_laws_raised(const hxForceLaws *laws, int *busy) {
   *busy = hx_touchdown_busy(&laws->touchdown);
   return laws->touchdown.offset;
 }
 
 /* Returns whether a foot on its way down has met the ground (C51). */
-static inline int hx_compliance_meets(const hxComplianceModel *model, int leg,
-                                      const hxCompliance *laws) {
-  return model->parts.touchdown && laws->trust.level == 1.0 && laws->touching[leg] &&
+static inline int hx_force_laws_meets(const hxForceLawsModel *model, int leg,
+                                      const hxForceLaws *laws) {
+  return model->parts.touchdown && laws->trust.level == 1.0 && laws->contact[leg] &&
          !laws->misled[leg];
 }
 
 /* Returns whether the gait clock waits for the feet of legs that end their swing (C50). waiting: it
  * waits already. */
-static inline int hx_compliance_waits(const hxComplianceModel *model, const int landing[HX_LEGS],
-                                      int waiting, const hxCompliance *laws) {
+static inline int hx_force_laws_waits(const hxForceLawsModel *model, const int landing[HX_LEGS],
+                                      int waiting, const hxForceLaws *laws) {
   int waits = 0;
   if (!model->parts.touchdown || laws->trust.level < 1.0) return 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int found = waiting ? laws->carrying[leg] : laws->touching[leg];
+    const int found = waiting ? laws->carrying[leg] : laws->contact[leg];
     waits |= landing[leg] && !found && !laws->misled[leg] &&
              laws->touchdown.offset[leg] > -hx_reach_limit;
   }
@@ -355,16 +354,16 @@ static inline int hx_compliance_waits(const hxComplianceModel *model, const int 
 
 /* Advances the laws by one period. force: of the ground on the feet, walking frame [N]; replaced
  * where a sensor is not trusted. */
-static inline void hx_compliance_step(const hxComplianceModel *model, const hxLoadPlan *plan,
-                                      double force[HX_LEGS][3], hxCompliance *laws) {
+static inline void hx_force_laws_step(const hxForceLawsModel *model, const hxLoadPlan *plan,
+                                      double force[HX_LEGS][3], hxForceLaws *laws) {
   double normal[HX_LEGS], reported = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) normal[leg] = force[leg][2];
   hx_contact_detector_step(model->weight, normal, laws->felt);
   for (int leg = 0; leg < HX_LEGS; ++leg) reported += laws->felt[leg] ? normal[leg] : 0.0;
   replace_forces(model, plan, force, laws);
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    laws->carrying[leg] = laws->touching[leg] && force[leg][2] > carrying_share * model->share;
-  hx_landings_look(laws->touching, plan->height, plan->swinging, &laws->landings);
+    laws->carrying[leg] = laws->contact[leg] && force[leg][2] > carrying_share * model->share;
+  hx_landings_update(laws->contact, plan->height, plan->swinging, &laws->landings);
   if (contacts_differ(plan, laws))
     examine_contacts(model, plan, (const double (*)[3])force, reported, laws);
   const double total = feel(model, plan, (const double (*)[3])force, normal, laws);
