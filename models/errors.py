@@ -80,7 +80,7 @@ def check_type(
         return
     raise error(
         "wrong type of an argument",
-        got=value,
+        got="nothing (None)" if value is None else value,
         expected=expected,
         fix=f"give {expected}",
         where=where,

@@ -195,7 +195,7 @@ def test_the_pattern_generator_walks_forward_and_turns(plant_build: Path) -> Non
 @pytest.mark.parametrize(
     ("arguments", "where"),
     [
-        ({"scenario": None}, "scenario: wrong type of an argument: got None"),
+        ({"scenario": None}, "scenario: wrong type of an argument: got 'nothing (None)'"),
         ({"scenario": 3}, "scenario: wrong type of an argument: got 3"),
         ({"settings": ["duration=3"]}, "settings: wrong type of an argument: got ['duration=3']"),
         ({"gains": 3}, "gains: wrong type of an argument: got 3"),
