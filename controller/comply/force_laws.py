@@ -144,9 +144,8 @@ class ForceLaws(Stateful):
         most = np.maximum(self.share, LIKELY * self.scale * plan.shares.normal)
         known = float(np.minimum(force[:, 2], most)[self.doubted & ~high].sum())
         total = np.where(self.doubted, reported, reported + known)
-        doubted = self.watch.update(
-            self.detector.contact, total, plan.standing | plan.awaited, high
-        )
+        loaded = plan.standing | plan.awaited
+        doubted = self.watch.update(self.detector.contact, total, loaded, high)
         blind = np.count_nonzero(doubted) >= TRIPOD_LEGS
         doubted = doubted | blind
         fresh = doubted & ~self.doubted
@@ -185,8 +184,7 @@ class ForceLaws(Stateful):
     def _squeeze_lost(self, plan: LoadPlan, deviation: Plane) -> float:
         """Returns the share of the planned squeeze that creep has taken away, in [0, 1] (C46).
 
-        deviation: (6,) of the tangential forces from the planned ones [N]. Without planned squeeze
-        it is 0.
+        deviation: (6,) of the tangential forces from the planned ones [N].
         """
         planned = np.where(self.contact, self.scale * plan.shares.squeeze, 0.0)
         whole = float(square(planned).sum())
