@@ -61,25 +61,28 @@ def _scenario_path(path_or_name: str | Path) -> Path:
     return bundled[str(path_or_name)]
 
 
-def read_overrides(overrides: Iterable[str]) -> dict[str, Any]:
+def read_overrides(overrides: Iterable[str], where: str = "--set") -> dict[str, Any]:
     """Returns the values of texts "NAME=VALUE" by name. Raises ScenarioError.
 
-    NAME is a key of the scenario or else an FMU parameter.
+    where: the option or what it sets, for the message.
     """
     values: dict[str, Any] = {}
     for text in overrides:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not name or not value:
-            fix = f"write --set {name or 'gait.period'}=VALUE, without a space"
+            fix = f"write {name or 'NAME'}=VALUE without a space"
             raise ScenarioError(
-                "not a setting", got=text, expected="NAME=VALUE", fix=fix, where="--set"
+                "not a setting", got=text, expected="NAME=VALUE", fix=fix, where=where
             )
         values[name] = parse_value(value)
     return values
 
 
 def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
-    """Returns a copy of the tables with each "NAME=VALUE" set. Raises ScenarioError."""
+    """Returns a copy of the tables with each "NAME=VALUE" set. Raises ScenarioError.
+
+    NAME is a key of the scenario or else an FMU parameter.
+    """
     return with_values(table, read_overrides(overrides))
 
 
