@@ -64,7 +64,7 @@ from hexapod_cosim.cosim.cli import main
         ),
         (
             ["simulate", "--set", "gait=ripple"],
-            ["got 'gait=ripple'", "--set gait.KEY=VALUE", "write --set gait.name=ripple"],
+            ["got 'gait=ripple'", "gait.KEY=VALUE", "write gait.name=ripple"],
         ),
         (
             ["simulate", "athena.fmu"],
