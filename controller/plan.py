@@ -17,7 +17,7 @@ import numpy as np
 from hexapod_cosim.controller.comply.compliant import Compliant, PresentStep
 from hexapod_cosim.controller.gains import Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, cis, rows_of
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, rows_of
 from hexapod_cosim.controller.planned_step import PlannedStep, StepPlanner
 from hexapod_cosim.controller.signals import JointCommand
 from hexapod_cosim.controller.walk.absence import Absence
@@ -61,15 +61,11 @@ class WalkPlan(Stateful):
         """Plans to stand. Constants depend on the gait; period: of the controller [s]."""
         self.legs, self.period, self.compliant = legs, period, compliant
         self.ramp = CommandRamp(gait.period, period=period)
-        home = legs.forward(legs.stance)
-        inward = -gait.narrowing * cis(legs.hip_yaw + legs.stance[:, 0])
-        narrow = legs.pose(home[:, 0] + 1j * home[:, 1] + inward, home[:, 2])
-        turned = legs.rolling(narrow.angle)
-        self.paths = FootPaths(gait, home, period=period, inward=inward, turned=turned)
+        self.paths = FootPaths(gait, legs, period=period)
         self.pace = Pace(gait, legs, self.paths.home_height)
         if compliant is not None:
             self.paths.clock.handover = compliant.support.handover
-        handover = 0.0 if compliant is None else compliant.support.handover * gait.period
+        handover = self.paths.clock.handover * gait.period  # s
         self.absence = Absence(legs, self.paths.home, handover=handover, period=period)
         self.planner = StepPlanner(parts, legs=legs, compliant=compliant)
         self.now: PlannedStep
@@ -140,20 +136,14 @@ class WalkPlan(Stateful):
             paths.narrowing = compliant.adaptation.narrowing
 
     def _waits(self) -> bool:
-        """Returns whether the gait clock waits for feet at the ends of their swings (C50).
-
-        It does not without a leg, because a foot may then have no load to carry.
-        """
+        """Returns whether the gait clock waits for feet at the ends of their swings (C50)."""
         clock = self.paths.clock
-        if self.compliant is None or clock.absent.any():
+        if self.compliant is None or clock.absent.any():  # without a leg, a foot may have no load
             return False
         return self.compliant.laws.waits(clock.landing(self.at), waiting=clock.waiting)
 
     def _plan_afresh(self, *, waiting: bool) -> None:
-        """Begins a new section at the present step, and plans the step after it.
-
-        waiting: the gait clock stands still in it.
-        """
+        """Begins a section now, where the clock may be waiting, and plans the step after it."""
         moves, settled = self.ramp.moves(), self.ramp.settled()
         if self.compliant is not None:
             self.compliant.steer(self.at, moves=moves, afresh=self.cut)
@@ -257,10 +247,7 @@ class WalkPlan(Stateful):
         return (getattr(self.after, name) - before) / (2.0 * self.period)
 
     def centres(self) -> Array:
-        """Returns the planned centres of the feet (6, 3), torso frame [m].
-
-        They are those of the paths with the shift due to rolling, without the lowering.
-        """
+        """Returns the planned centres of the feet (6, 3), rolling, not lowered, torso frame [m]."""
         now = self.now
         plane, height = now.posture.to_torso(now.plane + now.shift, now.feet.height)
         return rows_of(plane.real, plane.imag, height)
@@ -299,22 +286,12 @@ class WalkPlan(Stateful):
         )
 
     def present_step(self, speed: Array) -> PresentStep:
-        """Returns planned loads and geometry of the present step for the laws (C15 to C20).
-
-        speed: (6, 3) of the joints [rad/s].
-        """
+        """Returns loads and geometry at joint speeds (6, 3) [rad/s] for the laws (C15 to C20)."""
         compliant, now, clock = self.compliant, self.now, self.paths.clock
         assert compliant is not None
         demand = compliant.dynamics.demand(self.motion(), speed, now.posture, self.planner.laden())
-        load = compliant.plan(
-            demand,
-            now.activation,
-            feet=now.plane + now.shift,
-            height=self.lift(),
-            rise=now.feet.rise,
-            swinging=clock.swinging,
-            awaited=clock.awaited,
-        )
+        feet, height, rise = now.plane + now.shift, self.lift(), now.feet.rise
+        load = compliant.plan(demand, now.activation, clock, feet=feet, height=height, rise=rise)
         return PresentStep(
             load=load,
             climb=self.legs.speeds(now.pose, 0.0, 1.0),

@@ -25,7 +25,7 @@ from hexapod_cosim.controller.comply.planned_squeeze import PlannedSqueeze
 from hexapod_cosim.controller.comply.support import Support
 from hexapod_cosim.controller.gains import Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, cis, clamp
+from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis, clamp
 from hexapod_cosim.controller.sense.load_adaptation import LoadAdaptation
 from hexapod_cosim.controller.signals import JointCommand, Measurement
 from hexapod_cosim.controller.walk.gait import Gait
@@ -146,12 +146,11 @@ class Compliant(Stateful):
         self,
         demand: Demand,
         activation: Array,
+        clock: GaitClock,
         *,
         feet: Plane,
         height: Array,
         rise: Array,
-        swinging: Mask,
-        awaited: Mask,
     ) -> LoadPlan:
         """Returns the planned loads of feet (6,) x + i y, walking frame [m] (C19, C20, C42).
 
@@ -162,12 +161,11 @@ class Compliant(Stateful):
         return plan_load(
             demand,
             self.squeeze.add(feet, demand, shares, self.adaptation.squeeze),
+            clock,
             active=self.support.active,
             feet=feet,
             height=height,
             rise=rise,
-            swinging=swinging,
-            awaited=awaited,
             period=self.period,
         )
 
@@ -270,7 +268,7 @@ class Compliant(Stateful):
         output.angle_ref[...] = self._correct(output.angle_ref, climb, raised)
         output.torque_ref[...] = laws.torque
         self.adaptation.weigh(laws.heft)
-        self.adaptation.step(laws.torque, laws.needed(), laws.held)
+        self.adaptation.step(laws.torque, laws.needed(), laws.squeeze_share)
         if busy or self.moving:
             rise = (offset - self.offset) * self.per_second
             speed, most = output.speed_ref + climb * rise[:, None], self.legs.speed_max

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hexapod_cosim.controller.plane import Array, Mask, Plane, rows_of
+from hexapod_cosim.controller.walk.gait_clock import GaitClock
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand
 
 Vector = tuple[float, float, float]
@@ -75,13 +76,12 @@ class LoadPlan(NamedTuple):
 def plan_load(
     demand: Demand,
     shares: Shares,
+    clock: GaitClock,
     *,
     active: bool,
     feet: Plane,
     height: Array,
     rise: Array,
-    swinging: Mask,
-    awaited: Mask,
     period: float,
 ) -> LoadPlan:
     """Returns the planned loads and contacts of a step.
@@ -89,11 +89,10 @@ def plan_load(
     Args:
         demand: forces and torques that the planned motion needs.
         shares: planned forces on the feet.
+        clock: of the gait, in the section of the step.
         active: the servos carry the load; otherwise all torques are 0.
         feet: (6,) contact points x + i y, walking frame [m].
         height, rise: (6,) of the paths over the stance [m, m/s].
-        swinging: (6,) legs planned in the air.
-        awaited: (6,) feet that the gait clock waits for.
         period: of the controller [s].
     """
     supports = 1.0 if active else 0.0
@@ -107,7 +106,7 @@ def plan_load(
         standing=shares.activation >= 1.0,
         height=height,
         needed=float(np.abs(carry).max()),
-        swinging=swinging,
-        awaited=awaited,
+        swinging=clock.swinging,
+        awaited=clock.awaited,
         descent=np.maximum(-period * rise, 0.0),
     )

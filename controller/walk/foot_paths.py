@@ -20,7 +20,8 @@ from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, cis
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.gait_clock import CLOCK_EPSILON, NO_LEG, GaitClock
-from hexapod_cosim.controller.walk.swing import Twist, blend, hop, travel
+from hexapod_cosim.controller.walk.kinematics import LegSolver
+from hexapod_cosim.controller.walk.swing import Twist, blend, hop, odometry, travel
 
 # 1/s, m/s    downwards, of feet that end their swings at once
 DROP_RATE, LANDING_SPEED = 10.0, 0.08
@@ -66,32 +67,18 @@ class FootPaths(Stateful):
 
     STATE = ("clock", "met", "narrowing")
 
-    def __init__(
-        self,
-        gait: Gait,
-        home: Array,
-        *,
-        period: float,
-        inward: Plane | None = None,
-        turned: Array | None = None,
-    ) -> None:
-        """Puts all feet in the stance.
-
-        Args:
-            gait: of the robot.
-            home: (6, 3) centres of the feet in the stance, torso frame [m].
-            period: of the controller [s].
-            inward: (6,) from the stance to the narrow stance, torso frame [m]; by default 0.
-            turned: (6,) distances that the feet roll outwards on this way [m]; by default 0.
-        """
+    def __init__(self, gait: Gait, legs: LegSolver, *, period: float) -> None:
+        """Puts all feet in the stance. period: of the controller [s]."""
         self.gait, self.period = gait, period
         self.clock = GaitClock(gait, period=period)
         self.swing_time = gait.period * (1.0 - gait.duty)
         # from the lift-off to the middle of the next stance
         self.landing_lead = 0.5 * gait.period * gait.duty + self.swing_time
-        self.home, self.home_height = home[:, 0] + 1j * home[:, 1], home[:, 2].copy()
-        self.inward = np.zeros(LEGS, dtype=np.complex128) if inward is None else inward
-        self.turned = np.zeros(LEGS) if turned is None else turned
+        home = legs.forward(legs.stance)
+        self.home, self.home_height = home[:, 0] + 1j * home[:, 1], home[:, 2].copy()  # m
+        # m    from the stance to the narrow stance, and rolled outwards on this way
+        self.inward = -gait.narrowing * cis(legs.hip_yaw + legs.stance[:, 0])
+        self.turned = legs.rolling(legs.pose(self.home + self.inward, self.home_height).angle)
         self.met: Mask = NO_LEG
         self.narrowing = 0.0
 
@@ -127,9 +114,8 @@ class FootPaths(Stateful):
     def _come_home(self, swung: Mask, now: PlannedFeet) -> tuple[bool, Plane]:
         """Lets feet that are in their stance positions skip their steps.
 
-        swung: (6,) legs that were in the air until now. Returns whether all feet stand in their
-        stance positions, and the positions of the feet (6,) [m]; a foot that has just landed is at
-        its goal.
+        swung: (6,) legs that were in the air until now. Returns whether all feet stand there, and
+        the positions of the feet (6,) [m]; a foot that has just landed is at its goal.
         """
         landed = swung & self.clock.standing
         feet = np.where(landed, cis(-now.turn) * (now.goal - now.way), now.plane)
@@ -186,17 +172,11 @@ class FootPaths(Stateful):
         return feet._replace(height=np.where(clock.dropped, now.height, feet.height))
 
     def plan(self, now: PlannedFeet, number: int, *, going: bool, twist: Twist) -> PlannedFeet:
-        """Begins a new section after the present step.
+        """Begins a new section after the present step; returns its feet, as the section has them.
 
-        Args:
-            now: the feet at the present step.
-            number: periods since the last section began.
-            going: the body moves or is commanded to; otherwise feet step home and the gait clock
-                then stops.
-            twist: the motion of the body now.
-
-        Returns:
-            The feet at the present step, from which the section starts.
+        now: the feet at the present step; number: periods since the last section began; twist: of
+        the body now; going: the body moves or is commanded to, otherwise feet step home and the
+        gait clock then stops.
         """
         clock = self.clock
         if not clock.walking and not going:
@@ -227,10 +207,8 @@ class FootPaths(Stateful):
         return np.asarray((left - np.floor(left)) * self.gait.period)
 
     def _farthest(self, feet: PlannedFeet, begin: Array) -> float:
-        """Returns how far a foot will be from its stance position at its lift-off [m] (C55).
-
-        It is that of the farthest foot. feet: that stand; begin: (6,) phases at the begin of the
-        walk [cycles].
+        """Returns how far the farthest foot will be from its stance position at its lift-off [m]
+        (C55). feet: that stand; begin: (6,) phases at the begin of the walk [cycles].
         """
         time, motion = self._lift_offs(begin), _ground_motion(feet)
         far = np.abs(feet.plane - motion * time - self.aims())
@@ -272,22 +250,13 @@ class FootPaths(Stateful):
         ahead = self.landing_lead - tau * self.swing_time
         return np.asarray(cis(twist.yaw_rate * ahead) * self.aims() + travel(twist, ahead))
 
-    def _odometry(self, before: PlannedFeet, twist: Twist) -> tuple[complex, float]:
-        """Returns position [m] and heading [rad] of the walking frame in the ground frame (C3)."""
-        last = before.twist
-        mean = Twist(0.5 * (twist.velocity + last.velocity), 0.5 * (twist.yaw_rate + last.yaw_rate))
-        way = before.way + cis(before.turn) * travel(mean, self.period)
-        return complex(way), before.turn + mean.yaw_rate * self.period
-
     def walk(self, number: int, twist: Twist, before: PlannedFeet) -> PlannedFeet:
-        """Returns the feet `number` periods after the first step of the section.
-
-        before: the step before it.
-        """
+        """Returns the feet `number` periods after the section began. before: a step earlier."""
         clock = self.clock
         if not clock.walking:
             return before
-        way, turn = self._odometry(before, twist)
+        step, yaw = odometry(before.twist, twist, self.period)
+        way, turn = complex(before.way + cis(before.turn) * step), before.turn + yaw
         phase = clock.phase_after(clock.reached(number))
         tau = clock.progress(phase)
         free = clock.swinging & (tau < FREEZE)

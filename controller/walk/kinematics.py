@@ -103,13 +103,9 @@ class LegSolver:
         self.radius = robot.foot.radius  # m
 
     def forward(self, angle: Array) -> Array:
-        """Returns the centres of the feet at joint angles (C11).
+        """Returns the centres of the feet (..., 6, 3), torso frame [m] (C11).
 
-        Args:
-            angle: (..., 6, 3) joint angles [rad].
-
-        Returns:
-            (..., 6, 3) positions in the torso frame [m].
+        angle: (..., 6, 3) of the joints [rad].
         """
         a = angle[..., 1] + self.femur_tilt
         b = angle[..., 1] - angle[..., 2] + self.tibia_tilt
@@ -152,13 +148,9 @@ class LegSolver:
         return Pose(point, heading, foot, femur, tibia, angle, lost)
 
     def speeds(self, pose: Pose, velocity: Plane | float, rise: Array | float) -> Array:
-        """Returns the joint speeds for given velocities of the feet (C13).
+        """Returns the joint speeds (6, 3) for velocities of the feet, without limits [rad/s] (C13).
 
-        Args:
-            velocity, rise: (6,) velocities of x + i y and of z, torso frame [m/s].
-
-        Returns:
-            (6, 3) joint speeds without limits [rad/s].
+        velocity, rise: (6,) velocities of x + i y and of z, torso frame [m/s].
         """
         v = velocity * pose.heading.conj()
         turn = v.imag / (pose.foot.real + self.coxa_length)
@@ -177,9 +169,9 @@ class LegSolver:
         The speed of a joint at its angle limit is 0. Arguments are those of speeds().
         """
         angle = clamp(pose.angle, self.angle_min, self.angle_max)
-        held = ~(np.abs(pose.angle - angle) <= FLAG_TOLERANCE)
+        limited = ~(np.abs(pose.angle - angle) <= FLAG_TOLERANCE)
         speed = clamp(self.speeds(pose, velocity, rise), -self.speed_max, self.speed_max)
-        return Joints(angle, np.where(held, 0.0, speed), pose.lost | held.any(axis=-1))
+        return Joints(angle, np.where(limited, 0.0, speed), pose.lost | limited.any(axis=-1))
 
     def accelerations(
         self, neighbour: Pose | None, ahead: float, angle: Array, speed: Array
@@ -200,10 +192,10 @@ class LegSolver:
         if neighbour is None:
             return np.zeros_like(angle)
         most = 2.0 * self.speed_max / abs(ahead)
-        held = (angle <= self.angle_min) | (angle >= self.angle_max)
-        held |= np.abs(speed) >= self.speed_max
+        limited = (angle <= self.angle_min) | (angle >= self.angle_max)
+        limited |= np.abs(speed) >= self.speed_max
         way = clamp(neighbour.angle, self.angle_min, self.angle_max) - angle - ahead * speed
-        return np.where(held, 0.0, clamp(2.0 * way / (ahead * ahead), -most, most))
+        return np.where(limited, 0.0, clamp(2.0 * way / (ahead * ahead), -most, most))
 
     def softness(self, pose: Pose, kp: float) -> Softness:
         """Returns the softness of legs whose servos have the stiffness kp [N m/rad] (C25)."""

@@ -50,3 +50,12 @@ def travel(twist: Twist, time: Array | float) -> Plane:
     half = 0.5 * twist.yaw_rate * time
     arc = np.maximum(np.abs(half), SMALL_ANGLE)
     return np.asarray(twist.velocity * time * (np.sin(arc) / arc) * cis(half))
+
+
+def odometry(last: Twist, twist: Twist, period: float) -> tuple[Plane, float]:
+    """Returns displacement [m] and turn [rad] of the walking frame over a period [s] (C3).
+
+    last: the motion of the body at its begin; twist: at its end.
+    """
+    mean = Twist(0.5 * (twist.velocity + last.velocity), 0.5 * (twist.yaw_rate + last.yaw_rate))
+    return travel(mean, period), mean.yaw_rate * period

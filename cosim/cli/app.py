@@ -15,16 +15,16 @@ from hexapod_cosim.cosim.cli.failures import EPILOG
 CLI = "hexapod_cosim.cosim.cli"
 # name, line in the list of commands, place in cosim/cli
 CORE = (
-    ("export", "Write the FMU of a robot, its controller, or a package.", "export_command:export"),
-    ("simulate", "Run one co-simulation: results, metrics, plots.", "run_commands:simulate"),
-    ("compare", "Run walks under several controls and report them.", "run_commands:compare"),
-    ("design", "Design the gains of compliant and paper control.", "design_command:design"),
-    ("report", "Make the plots and the report of a folder again.", "short_commands:report"),
-    ("controller", "Write a controller of your own.", "short_commands:app"),
-    ("examples", "Copy the example programs and notebooks.", "short_commands:examples"),
-    ("validate", "Check an FMU of ours and say what is wrong.", "short_commands:validate"),
-    ("terrain", "Show a surface to walk on.", "short_commands:terrain"),
-    ("list", "List robots, scenarios, gaits, terrains and others.", "listing:list_what"),
+    ("export", "Write the FMU of a robot, its controller, or a package.", "export:export"),
+    ("simulate", "Run one co-simulation: results, metrics, plots.", "simulate:simulate"),
+    ("compare", "Run walks under several controls and report them.", "compare:compare"),
+    ("design", "Design the gains of compliant and paper control.", "design:design"),
+    ("report", "Make the plots and the report of a folder again.", "report:report"),
+    ("controller", "Write a controller of your own.", "examples:app"),
+    ("examples", "Copy the example programs and notebooks.", "examples:examples"),
+    ("validate", "Check an FMU of ours and say what is wrong.", "export:validate"),
+    ("terrain", "Show a surface to walk on.", "catalogue:terrain"),
+    ("list", "List robots, scenarios, gaits, terrains and others.", "catalogue:list_what"),
 )
 
 

@@ -22,6 +22,11 @@ EXIT_CODES = {
 EPILOG = (
     "Exit codes: " + "; ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + "."
 )
+RUN_EPILOG = (
+    f"Exit code {FELL} when the robot fell, or did not walk to the end of every run of a "
+    "comparison: what was recorded and measured is written all the same, and a comparison is of "
+    "the seeds on which both walked."
+)
 OF_ERRORS = ("what", "got", "expected", "fix", "where")  # attributes of a HexapodError
 
 # option that people expect -> setting that does what it would do
@@ -37,6 +42,7 @@ SETTINGS = {
     "--friction": "friction.mu=0.4",
     "--mu": "friction.mu=0.4",
     "--vx": "command.vx=0.12",
+    "--speed": "command.vx=0.12",
 }
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table, show_text
 from hexapod_cosim.cosim.common.files import named
-from hexapod_cosim.cosim.scenario.tables import parse_value
+from hexapod_cosim.cosim.scenario.tables import read_overrides
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
 from hexapod_cosim.models.ground.parameters import DIFFICULTY, Parameter
 from hexapod_cosim.models.ground.surface import PLANES, Surface
@@ -76,17 +76,8 @@ def surface_from(name: str, values: Iterable[str]) -> Surface:
     if name not in CATALOGUE:
         raise unknown_name("surface", name, CATALOGUE)
     table: dict[str, Any] = {"kind": name}
-    for text in values:
-        key, equals, value = (part.strip() for part in text.partition("="))
-        if not equals or not key or not value:
-            raise HexapodError(
-                "not a setting",
-                got=text,
-                expected="KEY=VALUE",
-                fix="write step_height=0.03",
-                where=name,
-            )
-        table[key.removeprefix(PREFIX)] = parse_value(value)
+    for key, value in read_overrides(values, where=name).items():
+        table[key.removeprefix(PREFIX)] = value
     surface = read_terrain(table, "terrain").surface
     assert surface is not None  # each entry of the catalogue has one
     return surface

@@ -212,12 +212,11 @@ class Fmu(Closing):
         if variable is None:
             raise self._unknown(name, [n for b in self._parameter_blocks for n in b.names])
         if variable.causality != "parameter":
-            pushed = name.startswith("torso.push")
             raise FmuError(
                 "not a parameter",
                 got=name,
                 expected=f"a parameter, and this is an {variable.causality}",
-                fix="[[events]] push the torso" if pushed else "set a parameter",
+                fix="set a parameter; [[events]] push the torso",
                 where=self.path.name,
             )
         return variable

@@ -169,7 +169,8 @@ def macro_step(
 ) -> None:
     """Makes the macro-step from t to t + h [s] and reads the plant's outputs.
 
-    Every loop in Python calls it; cosim/master/src/macro_step.c is the same in C.
+    Every loop in Python calls it; cosim/master/src/macro_step.c, its equal in C, also calls the
+    controller.
 
     Args:
         step: steps the plant from t by h.

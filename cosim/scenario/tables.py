@@ -61,36 +61,41 @@ def _scenario_path(path_or_name: str | Path) -> Path:
     return bundled[str(path_or_name)]
 
 
-def read_overrides(overrides: Iterable[str]) -> dict[str, Any]:
+def read_overrides(overrides: Iterable[str], where: str = "--set") -> dict[str, Any]:
     """Returns the values of texts "NAME=VALUE" by name. Raises ScenarioError.
 
-    NAME is a key of the scenario or else an FMU parameter.
+    where: the option or what it sets, for the message.
     """
     values: dict[str, Any] = {}
     for text in overrides:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not name or not value:
-            fix = f"write --set {name or 'gait.period'}=VALUE, without a space"
+            fix = f"write {name or 'NAME'}=VALUE without a space"
             raise ScenarioError(
-                "not a setting", got=text, expected="NAME=VALUE", fix=fix, where="--set"
+                "not a setting", got=text, expected="NAME=VALUE", fix=fix, where=where
             )
         values[name] = parse_value(value)
     return values
 
 
 def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
-    """Returns a copy of the tables with each "NAME=VALUE" set. Raises ScenarioError."""
+    """Returns a copy of the tables with each "NAME=VALUE" set. Raises ScenarioError.
+
+    NAME is a key of the scenario or else an FMU parameter.
+    """
     return with_values(table, read_overrides(overrides))
 
 
-def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+def with_values(
+    table: Mapping[str, Any], values: Mapping[str, Any], where: str = "--set"
+) -> dict[str, Any]:
     """Returns a copy of the tables with each value set by name, as --set does.
 
-    Raises ScenarioError.
+    where: the option or argument with the values, for the message. Raises ScenarioError.
     """
     changed = deepcopy(dict(table))
     for name, value in values.items():
-        _set(changed, name, value)
+        _set(changed, name, value, where)
     return changed
 
 
@@ -105,7 +110,7 @@ def parse_value(value: str) -> Any:
         return float(value) if POINTED.fullmatch(value) else value
 
 
-def _set(table: dict[str, Any], name: str, value: Any) -> None:
+def _set(table: dict[str, Any], name: str, value: Any, where: str) -> None:
     """Sets a key of the scenario or an FMU parameter by its dotted name, in place."""
     section, dot, key = name.partition(".")
     if name == "control" and isinstance(table.get(name), dict):
@@ -124,7 +129,7 @@ def _set(table: dict[str, Any], name: str, value: Any) -> None:
                 got=name,
                 expected=f"a table [{section}]",
                 fix=fix,
-                where="--set",
+                where=where,
             )
         inner[key] = value
     elif dot or "[" in name:
@@ -133,11 +138,11 @@ def _set(table: dict[str, Any], name: str, value: Any) -> None:
         raise ScenarioError(
             "a section, which has keys",
             got=f"{name}={value}",
-            expected=f"--set {name}.KEY=VALUE",
-            fix=f"write --set {name}.{next(iter(specs(SETTINGS[name])))}={value}",
-            where="--set",
+            expected=f"{name}.KEY=VALUE",
+            fix=f"write {name}.{next(iter(specs(SETTINGS[name])))}={value}",
+            where=where,
         )
     elif name in KEYS:
         table[name] = value
     else:
-        raise unknown_name("setting", name, KEYS, where="--set", error=ScenarioError)
+        raise unknown_name("setting", name, KEYS, where=where, error=ScenarioError)

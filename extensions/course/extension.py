@@ -2,7 +2,7 @@
 
 from hexapod_cosim.cosim.cli.extension import Command, Extension
 
-MODULE = "hexapod_cosim.extensions.course.benchmark_command"
+MODULE = "hexapod_cosim.extensions.course.command"
 BENCHMARK = Command(
     name="benchmark",
     about="Judge controls on the course of fixed cases.",

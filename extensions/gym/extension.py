@@ -5,7 +5,7 @@ from hexapod_cosim.cosim.cli.extension import Command, Extension
 GYM = Command(
     name="gym",
     about="Train and export policies for reinforcement learning.",
-    place="hexapod_cosim.extensions.gym.gym_command:app",
+    place="hexapod_cosim.extensions.gym.command:app",
 )
 EXTENSION = Extension(
     commands=[GYM],

@@ -11,6 +11,6 @@ REPLAY = Command(
 IDENTIFY = Command(
     name="identify",
     about="Find a robot's numbers from its own logs.",
-    place=f"{PACKAGE}.identify_command:identify",
+    place=f"{PACKAGE}.command:identify",
 )
 EXTENSION = Extension(commands=[REPLAY, IDENTIFY])

@@ -13,7 +13,7 @@ import typer
 
 from hexapod_cosim.controller import Gains, GainsError
 from hexapod_cosim.cosim.cli.options import ControlNames, GainsFile, Json, Name, Settings
-from hexapod_cosim.cosim.cli.running import given_gains
+from hexapod_cosim.cosim.cli.runs import given_gains
 from hexapod_cosim.cosim.cli.terminal import (
     progress_bar,
     refuse_unused,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from hexapod_cosim.cosim.cli.extension import Command, Extension, Rows
 
-MODULE = "hexapod_cosim.extensions.study.study_command"
+MODULE = "hexapod_cosim.extensions.study.command"
 STUDY = Command(
     name="study",
     about="Run a study: a sweep, a Monte Carlo study or an optimisation.",
@@ -26,6 +26,6 @@ def list_studies() -> dict[str, Path]:
 
 def bundled_studies() -> Rows:
     """Returns what `hexapod list studies` shows."""
-    from hexapod_cosim.cosim.cli.listing import titles  # noqa: PLC0415
+    from hexapod_cosim.cosim.cli.catalogue import titles  # noqa: PLC0415
 
     return titles(list_studies())

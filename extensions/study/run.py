@@ -1,6 +1,6 @@
 """Runs a study, or what is missing of it, for `hexapod study`, and shows its results.
 
-The command is in study_command.py, because the imports of this module take a second.
+The command is in command.py, because the imports of this module take a second.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
 /* shared.c - what every component needs: names of statuses, checksums, range checks */
+#include <float.h>
 #include <string.h>
 
 #include "hexapod/message.h"
@@ -69,6 +70,19 @@ void hx_check_ranges(hxChecker *checker, const void *structure, const hxRange *r
   hx_print(expected, sizeof expected, "%.9g to %.9g%s%s", range[i].min, range[i].max,
            hx_unit_gap(range[i].unit), range[i].unit);
   hx_check_fail(checker, range[i].name, number_at(structure, &range[i]), expected);
+}
+
+hxStatus hx_check_end(double time, double t_end, char *message) {
+  if (t_end >= time && t_end <= DBL_MAX) return HX_OK;
+  hx_print(message, HX_MESSAGE_SIZE,
+           "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end, time);
+  return HX_INVALID_ARGUMENT;
+}
+
+void hx_ramp(const void *input, const void *rate, double time, size_t n, void *now) {
+  const double *from = input, *slope = rate;
+  double *to = now;
+  for (size_t i = 0; i < n; ++i) to[i] = from[i] + slope[i] * time;
 }
 
 const char *hx_leg_name(int leg) {

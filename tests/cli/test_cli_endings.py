@@ -186,7 +186,7 @@ def test_a_fall_under_either_control_ends_a_comparison_with_the_code_of_falls(
                 warnings=() if stands else ("it fell",),
             )
 
-    monkeypatch.setattr("hexapod_cosim.cosim.cli.running.run_batch", others)
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.runs.run_batch", others)
     returned, out, _ = call(
         "compare",
         "stand",

@@ -55,16 +55,17 @@ from hexapod_cosim.cosim.cli import main
         ),
         (["export", "-o", "."], ["got '.'", "ends in .fmu", "write -o athena.fmu"]),
         (["export", "--fmi", "7"], ["FMI version", "got 7"]),
+        (["simulate", "--format", "hdf5"], ["--format: unknown format", "got 'hdf5'", "parquet"]),
         (["export", "--platforms", "amiga"], ["amiga"]),
         (["list", "robot"], ["'robot'", "did you mean 'robots'"]),
         (["compare", "--seeds", "x"], ["Invalid value 'x' for '--seeds'", "compare --help"]),
         (
             ["simulate", "--set", "duration", "3"],
-            ["--set: not a setting", "got 'duration'", "write --set duration=VALUE"],
+            ["--set: not a setting", "got 'duration'", "write duration=VALUE"],
         ),
         (
             ["simulate", "--set", "gait=ripple"],
-            ["got 'gait=ripple'", "--set gait.KEY=VALUE", "write --set gait.name=ripple"],
+            ["got 'gait=ripple'", "gait.KEY=VALUE", "write gait.name=ripple"],
         ),
         (
             ["simulate", "athena.fmu"],
@@ -167,7 +168,7 @@ def test_an_unexpected_error_is_one_line_with_a_hint(
     def burst(*_: object, **__: object) -> None:
         raise ZeroDivisionError("by nought")
 
-    monkeypatch.setattr("hexapod_cosim.cosim.cli.simulating.load_scenario", burst)
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.simulation.load_scenario", burst)
     assert_refused(call("simulate"), "unexpected ZeroDivisionError: by nought", "--debug")
     with pytest.raises(ZeroDivisionError):
         main(["--debug", "simulate"])
@@ -197,7 +198,11 @@ def test_an_unexpected_error_is_one_line_with_a_hint(
         (
             ["simulate", "--speed", "3"],
             2,
-            {"what": "not understood", "got": "No such option: --speed (Possible options: --set)"},
+            {
+                "what": "not understood",
+                "got": "No such option: --speed (Possible options: --set)",
+                "fix": "write --set command.vx=0.12; `hexapod simulate --help` explains it",
+            },
         ),
         (
             ["compare", "--seeds", "0"],
@@ -241,7 +246,7 @@ def test_with_json_an_interrupt_is_an_object_too(
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hexapod_cosim.cosim.cli.simulating.load_scenario", interrupted)
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.simulation.load_scenario", interrupted)
     code, out, err = call("simulate", "--json")
     assert (code, err) == (130, "hexapod: interrupted\n")
     assert json.loads(out)["exit_code"] == 130

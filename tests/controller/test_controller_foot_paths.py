@@ -20,7 +20,7 @@ ROUND_OFF = 1e-12  # m/s
 TWIST, STRAIGHT, REST = Twist(0.05 - 0.03j, 0.4), Twist(0.08 + 0j, 0.0), Twist(0j, 0.0)
 
 
-class Walk:
+class SteppedPaths:
     """The paths of a walk, computed section by section. `at` counts the steps since the section
     began.
     """
@@ -30,8 +30,7 @@ class Walk:
     ) -> None:
         robot = load_robot("athena")
         self.gait = make_gait(robot, name, touchdown_speed=touchdown_speed)
-        home = LegSolver(robot).forward(robot.stance)
-        self.paths = FootPaths(self.gait, home, period=period)
+        self.paths = FootPaths(self.gait, LegSolver(robot), period=period)
         self.feet, self.at = self.paths.reset(), 0
 
     def step(self, twist: Twist, *, going: bool = True, afresh: bool = False) -> None:
@@ -50,14 +49,16 @@ class Walk:
         return np.where(self.paths.clock.swinging, tau, 0.0)
 
 
-def advance(walk: Walk, twist: Twist, steps: int, *, going: bool = True) -> Iterator[Walk]:
+def advance(
+    walk: SteppedPaths, twist: Twist, steps: int, *, going: bool = True
+) -> Iterator[SteppedPaths]:
     """Takes steps under a steady twist."""
     for k in range(steps):
         walk.step(twist, going=going, afresh=k == 0)
         yield walk
 
 
-def record(steps: Iterable[Walk]) -> dict[str, np.ndarray]:
+def record(steps: Iterable[SteppedPaths]) -> dict[str, np.ndarray]:
     """Records the feet of each step, `swinging` and `progress`."""
     rows = [
         {**walk.feet._asdict(), "swinging": walk.paths.clock.swinging, "progress": walk.progress}
@@ -69,7 +70,7 @@ def record(steps: Iterable[Walk]) -> dict[str, np.ndarray]:
     }
 
 
-def steady(walk: Walk, twist: Twist, steps: int) -> dict[str, np.ndarray]:
+def steady(walk: SteppedPaths, twist: Twist, steps: int) -> dict[str, np.ndarray]:
     """Returns the records of each step under a steady twist, after two cycles."""
     record(advance(walk, twist, round(2.0 * walk.gait.period / walk.paths.period)))
     return record(advance(walk, twist, steps))
@@ -84,7 +85,7 @@ def ground_velocity(log: dict[str, np.ndarray], twist: Twist) -> np.ndarray:
 @pytest.mark.parametrize("name", GAITS)
 @pytest.mark.parametrize("twist", [STRAIGHT, TWIST, Twist(0j, 0.5)])
 def test_standing_feet_move_against_the_body_command_exactly(name: str, twist: Twist) -> None:
-    log = steady(Walk(name), twist, 1000)
+    log = steady(SteppedPaths(name), twist, 1000)
     over_ground = ground_velocity(log, twist)
     assert np.abs(over_ground[~log["swinging"]]).max() < ROUND_OFF
     assert np.abs(log["rise"][~log["swinging"]]).max() == 0.0
@@ -94,12 +95,10 @@ INWARD = np.array([-0.020, -0.025j, 0.020, -0.020, 0.025j, 0.020], dtype=np.comp
 TURNED = np.full(6, -4e-3)  # m
 
 
-def narrowing_walk() -> Walk:
+def narrowing_walk() -> SteppedPaths:
     """Returns a walk that is in the middle of the way to a narrow stance, in its amble."""
-    walk = Walk("amble")
-    home = LegSolver(load_robot("athena")).forward(load_robot("athena").stance)
-    walk.paths = FootPaths(walk.gait, home, period=PERIOD, inward=INWARD, turned=TURNED)
-    walk.feet = walk.paths.reset()
+    walk = SteppedPaths("amble")
+    walk.paths.inward, walk.paths.turned = INWARD, TURNED
     walk.paths.narrowing = 0.5
     return walk
 
@@ -119,7 +118,7 @@ def test_narrowed_steps_pass_the_middle_of_their_stance_at_the_narrow_position()
 
 @pytest.mark.parametrize("twist", [STRAIGHT, TWIST])
 def test_velocity_is_the_slope_of_position_and_nothing_jumps(twist: Twist) -> None:
-    log = steady(Walk("ripple"), twist, 1000)
+    log = steady(SteppedPaths("ripple"), twist, 1000)
     largest = (
         30.0 * PERIOD
     )  # m/s; velocities change by 30 m/s2 in a step; a jump would be of order 0.1
@@ -132,7 +131,7 @@ def test_velocity_is_the_slope_of_position_and_nothing_jumps(twist: Twist) -> No
 
 @pytest.mark.parametrize("twist", [STRAIGHT, TWIST])
 def test_feet_lift_off_and_touch_down_at_rest_on_the_ground(twist: Twist) -> None:
-    log = steady(Walk(), twist, 1000)
+    log = steady(SteppedPaths(), twist, 1000)
     over_ground = ground_velocity(log, twist)
     ends = log["swinging"] & ((log["progress"] < 0.1) | (log["progress"] > 0.9))
     assert (
@@ -152,7 +151,7 @@ def test_a_foot_moves_along_the_ground_between_a_tenth_and_nine_tenths_of_its_sw
     done, rate = blend(np.array([progress]))
     assert bool(rate[0] > 0.0) is moves
     assert bool(0.0 < done[0] < 1.0) is moves
-    log = steady(Walk(), STRAIGHT, 1000)
+    log = steady(SteppedPaths(), STRAIGHT, 1000)
     there = log["swinging"] & (np.abs(log["progress"] - progress) < 0.003)
     assert there.any()
     # at a progress of 0.12 the foot has 1 % of its largest speed, which is about 0.3 m/s
@@ -160,7 +159,7 @@ def test_a_foot_moves_along_the_ground_between_a_tenth_and_nine_tenths_of_its_sw
 
 
 def test_the_foot_rises_by_the_step_height() -> None:
-    walk = Walk()
+    walk = SteppedPaths()
     log = steady(walk, STRAIGHT, 1000)
     np.testing.assert_allclose(
         (log["height"] - walk.paths.home_height).max(axis=0), walk.gait.step_height, rtol=1e-4
@@ -171,7 +170,7 @@ def test_the_foot_rises_by_the_step_height() -> None:
 def test_a_foot_follows_a_new_command_up_to_three_quarters_of_its_swing(
     progress: float, follows: bool
 ) -> None:
-    walk = Walk()
+    walk = SteppedPaths()
     for _ in advance(walk, STRAIGHT, 2000):
         if progress <= walk.progress.max() < progress + 0.01:
             break
@@ -186,7 +185,7 @@ def test_a_section_that_begins_afresh_under_the_same_twist_is_the_same_walk(name
     """The walk differs by round-off only, because the feet's landing points are computed again from
     where the feet are.
     """
-    whole, cut = Walk(name, period=0.007), Walk(name, period=0.007)
+    whole, cut = SteppedPaths(name, period=0.007), SteppedPaths(name, period=0.007)
     for k in range(400):
         whole.step(TWIST)
         cut.step(TWIST, afresh=k % 7 == 0)
@@ -219,7 +218,7 @@ def test_a_command_that_is_not_a_number_is_refused() -> None:
 
 def test_while_the_clock_is_held_no_foot_moves_over_the_ground_and_then_it_continues() -> None:
     robot = load_robot("athena")
-    paths = FootPaths(make_gait(robot), LegSolver(robot).forward(robot.stance), period=0.005)
+    paths = FootPaths(make_gait(robot), LegSolver(robot), period=0.005)
     twist = Twist(0.05 + 0.01j, 0.1)
     feet, number = paths.plan(paths.reset(), 0, going=True, twist=twist), 0
     while paths.clock.reach(number + 1):
@@ -245,7 +244,7 @@ def test_while_the_clock_is_held_no_foot_moves_over_the_ground_and_then_it_conti
 
 def test_a_foot_that_has_met_the_ground_stays_there() -> None:
     robot = load_robot("athena")
-    paths = FootPaths(make_gait(robot), LegSolver(robot).forward(robot.stance), period=0.005)
+    paths = FootPaths(make_gait(robot), LegSolver(robot), period=0.005)
     twist = Twist(0.08 + 0j, 0.0)
     feet = paths.plan(paths.reset(), 0, going=True, twist=twist)
     for number in range(1, 71):

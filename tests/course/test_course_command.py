@@ -39,7 +39,7 @@ def replayed(monkeypatch: pytest.MonkeyPatch, found: tuple[Run, ...]) -> None:
     def again(*_: Any, **__: Any) -> Iterator[Run]:
         yield from found
 
-    monkeypatch.setattr("hexapod_cosim.extensions.course.benchmark_command.run_course", again)
+    monkeypatch.setattr("hexapod_cosim.extensions.course.command.run_course", again)
 
 
 CHOICE = ["--split", "tune", "--seeds", "2", "--case", "rough_10", "--case", "turn", *KINEMATIC]

@@ -38,7 +38,7 @@ def commands(speed: float) -> Array:
     return np.array(rows)
 
 
-class Walk:
+class StandingRobot:
     """A standing robot from which walks begin; numbers: servo.kp, torso.mass, speed."""
 
     def __init__(self, library: Path, h: float) -> None:
@@ -108,7 +108,7 @@ class Walk:
 def test_the_gradient_of_a_walk_s_cost_is_that_of_whole_walks(
     plant_library: Path, h: float, lifted: float, touched: float
 ) -> None:
-    walk = Walk(plant_library, h)
+    walk = StandingRobot(plant_library, h)
     _, slope, loaded = walk.cost(walk.numbers, gradient=True)
     differences = np.empty_like(slope)
     for i, size in enumerate(1e-4 * walk.numbers):

@@ -29,7 +29,7 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 
-WALKER = Path(__file__).resolve().parents[1] / "native" / "walker.c"
+REPEATER = Path(__file__).resolve().parents[1] / "native" / "repeater.c"
 ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")
 DURATION = 1.5  # s    of walking: touch-downs and lift-offs of all feet
 TIMEOUT = 300  # s
@@ -69,7 +69,7 @@ def missing(target: str) -> list[str]:
 
 def record_walk(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """Records a walk over flat ground and returns the inputs of every step in the form that
-    walker.c reads.
+    repeater.c reads.
     """
     rows: list[list[float]] = []
     inputs, step = [entry for entry in described(fmu) if entry.causality == "input"], Fmu.step
@@ -117,9 +117,9 @@ def number(word: str) -> float:
     return float(struct.unpack("<d", struct.pack("<Q", int(word, 16)))[0])
 
 
-def build_walker(target: str, folder: Path) -> Path:
+def build_repeater(target: str, folder: Path) -> Path:
     """Builds the calling program for a target."""
-    program = folder / ("walker.exe" if "windows" in target else "walker")
+    program = folder / ("repeater.exe" if "windows" in target else "repeater")
     flags = (
         "-target",
         TARGETS[target].triple,
@@ -133,7 +133,7 @@ def build_walker(target: str, folder: Path) -> Path:
         *flags,
         "-isystem",
         str(fmi_headers()),
-        str(WALKER),
+        str(REPEATER),
         *libraries,
         "-o",
         str(program),
@@ -154,7 +154,7 @@ def build_walker(target: str, folder: Path) -> Path:
     return program
 
 
-def run_walker(
+def run_repeater(
     target: str, program: Path, library: Path, guid: str, resources: str, inputs: Path
 ) -> subprocess.CompletedProcess[str]:
     """Repeats a recorded walk; returns the outputs of every step."""

@@ -20,7 +20,7 @@ from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
 from hexapod_cosim.models import load_robot
 from tools.importers.capabilities import adjoint, tuned, updated
 from tools.importers.compare import ROUND_OFF, largest_difference
-from tools.importers.walk import STEP, Walk, record
+from tools.importers.walk import STEP, ReferenceRun, record
 
 DURATION = 0.6  # s; long enough for the ramp, a lift-off and a touch-down
 MOST_LINES = 72  # of the C importer
@@ -29,7 +29,7 @@ SOURCE, README = ROOT / "examples" / "importer.c", ROOT / "README.md"
 
 
 @pytest.fixture(scope="module")
-def walk(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Walk:
+def walk(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> ReferenceRun:
     return record(tmp_path_factory.mktemp("walk"), duration=DURATION)
 
 
@@ -68,7 +68,7 @@ def run(*command: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_the_recorded_walk_lifts_and_sets_down_feet(walk: Walk) -> None:
+def test_the_recorded_walk_lifts_and_sets_down_feet(walk: ReferenceRun) -> None:
     contact = walk.reference.columns(
         [f"{leg}.foot.contact" for leg in ("LF", "LM", "LR", "RF", "RM", "RR")]
     )
@@ -77,11 +77,11 @@ def test_the_recorded_walk_lifts_and_sets_down_feet(walk: Walk) -> None:
     assert (changes > 0.0).any()
 
 
-def test_our_master_and_fmpy_give_the_same_walk(walk: Walk) -> None:
+def test_our_master_and_fmpy_give_the_same_walk(walk: ReferenceRun) -> None:
     assert largest_difference(walk.recorded, walk.reference)[0] <= ROUND_OFF
 
 
-def test_a_delay_of_one_step_exceeds_round_off(walk: Walk) -> None:
+def test_a_delay_of_one_step_exceeds_round_off(walk: ReferenceRun) -> None:
     commands = read_csv(walk.inputs)
     late = np.vstack([commands.data[:1], commands.data[:-1]])
     late[:, 0] = commands.time
@@ -93,7 +93,9 @@ def test_a_delay_of_one_step_exceeds_round_off(walk: Walk) -> None:
     assert largest_difference(found, walk.reference)[0] > 1e6 * ROUND_OFF
 
 
-def test_the_c_importer_walks_as_fmpy_does(walk: Walk, importer: Path, tmp_path: Path) -> None:
+def test_the_c_importer_walks_as_fmpy_does(
+    walk: ReferenceRun, importer: Path, tmp_path: Path
+) -> None:
     done = run(importer, walk.unpacked, walk.inputs)
     assert done.returncode == 0, done.stderr
     (tmp_path / "outputs.csv").write_text(done.stdout, encoding="utf-8")
@@ -121,7 +123,7 @@ def test_the_c_importer_has_the_lines_that_the_readme_says() -> None:
 
 
 def test_the_c_importer_refuses_a_short_row_and_takes_names_without_quotes(
-    walk: Walk, importer: Path, tmp_path: Path
+    walk: ReferenceRun, importer: Path, tmp_path: Path
 ) -> None:
     commands = tmp_path / "commands.csv"
     commands.write_text(
@@ -147,7 +149,7 @@ def test_the_c_importer_reports_missing_files(
 
 
 def test_fmpy_tunes_is_told_between_and_gets_adjoint_derivatives(
-    plant_build: Path, walk: Walk, tmp_path: Path
+    plant_build: Path, walk: ReferenceRun, tmp_path: Path
 ) -> None:
     fmu3 = export_fmu(load_robot("athena"), tmp_path / "athena.fmu", fmi=3)
     for found in (tuned(walk.fmu, fmu3), updated(fmu3), adjoint(fmu3)):

@@ -16,12 +16,12 @@ import pytest
 from platform_walk import (
     EMULATORS,
     EVERYTHING,
-    build_walker,
+    build_repeater,
     missing,
     number,
     patient,
     record_walk,
-    run_walker,
+    run_repeater,
 )
 
 from hexapod_cosim.cosim.export.cross_build import TARGETS, build_library
@@ -46,7 +46,7 @@ def on_ground(name: str) -> Robot:
     return replace(robot, terrain=read_terrain({"kind": kind, "platform_size": 0.0}, name))
 
 
-class Walk:
+class RecordedRun:
     """The FMU's resources in a folder with a special name, the inputs of a recorded walk, and the
     outputs of CMake's binary.
     """
@@ -71,12 +71,12 @@ class Walk:
         folder.mkdir(exist_ok=True)
         library, program = (
             folder / f"hexapod{TARGETS[target].suffix}",
-            folder / ("walker.exe" if "windows" in target else "walker"),
+            folder / ("repeater.exe" if "windows" in target else "repeater"),
         )
         library.write_bytes(data)
         if not program.exists():
-            build_walker(target, folder)
-        process = run_walker(target, program, library, self.guid, resources, self.inputs)
+            build_repeater(target, folder)
+        process = run_repeater(target, program, library, self.guid, resources, self.inputs)
         assert process.returncode == 0, process.stderr
         return process.stdout.split()
 
@@ -95,10 +95,10 @@ def walk(
     recorded: str,
     plant_library: Path,
     tmp_path_factory: pytest.TempPathFactory,
-) -> Walk:
+) -> RecordedRun:
     inputs = recorded if request.param == "plane" else first_steps(recorded, SHORT)
     folder = tmp_path_factory.mktemp("walk")
-    return Walk(folder, plant_library, on_ground(request.param), inputs)
+    return RecordedRun(folder, plant_library, on_ground(request.param), inputs)
 
 
 def first_steps(inputs: str, steps: int) -> str:
@@ -115,7 +115,7 @@ def runs_here(target: str) -> None:
         pytest.skip(f"no {', '.join(needs)}: make test-platforms installs it")
 
 
-def test_the_recorded_walk_moves_the_robot(walk: Walk) -> None:
+def test_the_recorded_walk_moves_the_robot(walk: RecordedRun) -> None:
     steps = walk.steps
     assert len(steps) in (STEPS, SHORT)
     assert len({tuple(step) for step in steps}) == len(steps)
@@ -123,7 +123,7 @@ def test_the_recorded_walk_moves_the_robot(walk: Walk) -> None:
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the reference is of another processor")
 @pytest.mark.parametrize("target", EMULATORS)
-def test_every_platform_walks_the_same_walk_bit_for_bit(walk: Walk, target: str) -> None:
+def test_every_platform_walks_the_same_walk_bit_for_bit(walk: RecordedRun, target: str) -> None:
     runs_here(target)
     patient(target)
     data = build_library(library_to_build(), target)

@@ -160,7 +160,7 @@ def test_an_interrupt_of_the_check_leaves_whole_results_without_it(
     def struck(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hexapod_cosim.cosim.cli.running.reference_scenario", struck)
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.runs.reference_scenario", struck)
     quick = settings("duration=0.2", "outputs.plots=false")
     code, _, err = call(*command, "stand", "-o", tmp_path / "out", "--check-accuracy", *quick)
     assert code == 130

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from walks import PARAMETERS, PERIOD, ROBOT, Walk
+from walks import PARAMETERS, PERIOD, ROBOT, SyntheticRun
 
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.metric_table import METRICS
@@ -79,9 +79,9 @@ def test_the_residual_of_a_standing_robot_vanishes_with_the_tolerance(runner: Ru
 # Warnings of an energy balance that does not close and of servos above their rating.
 
 
-def walk_missing(missing: float) -> Walk:
+def walk_missing(missing: float) -> SyntheticRun:
     """A walk whose motors did 60 J and took 40 J; `missing` [J] is the residual at the end."""
-    walk = Walk()
+    walk = SyntheticRun()
     walk.grow("LF.femur.positive_work", 6.0)
     walk.grow("RM.tibia.negative_work", 4.0)
     walk.set("energy.residual", missing * walk.time / 10.0)
@@ -112,7 +112,7 @@ def test_an_energy_warning_is_a_warning_of_the_run() -> None:
 @pytest.mark.parametrize(("torque", "warned"), [(1.19, False), (1.21, True)])
 def test_a_servo_above_its_rating_over_the_run_is_warned_of(torque: float, warned: bool) -> None:
     """The rating of 1.2 N m is compared with the RMS torque over the whole run."""
-    walk = Walk()
+    walk = SyntheticRun()
     walk.grow("LM.femur.torque_squared", torque**2)
     found = servo_warnings(walk.recording, ROBOT)
     text = f"servo LM.femur works at {torque:.2f} N m RMS, above its continuous rating of 1.2 N m"

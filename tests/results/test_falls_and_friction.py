@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from walks import PARAMETERS, PERIOD, ROBOT, Walk
+from walks import PARAMETERS, PERIOD, ROBOT, SyntheticRun
 
 from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.master.loop import COMPLETED
@@ -26,7 +26,7 @@ STANDING = 0.130  # m
 SLOPE = {"terrain.kind": 2.0, "terrain.incline": 0.5}
 
 
-class Run(Walk):
+class Run(SyntheticRun):
     """Ten seconds of a standing robot, which tests modify."""
 
     def __init__(self) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from walks import CYCLES, PARAMETERS, PERIOD, SERVO, WEIGHT, H, Walk
+from walks import CYCLES, PARAMETERS, PERIOD, SERVO, WEIGHT, H, SyntheticRun
 
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names
 from hexapod_cosim.cosim.master.recorder import Recording
@@ -51,11 +51,11 @@ def test_the_metrics_are_those_of_the_contract_with_slip_after_what_is_exactly_m
         "energy_residual",
         "realtime_factor",
     ]
-    assert list(Walk().metrics()) == list(METRICS)
+    assert list(SyntheticRun().metrics()) == list(METRICS)
 
 
 def test_forces_are_in_body_weights_and_the_percentile_is_of_loaded_feet() -> None:
-    walk = Walk()
+    walk = SyntheticRun()
     force = np.linspace(0.0, 1.0, len(walk.time))
     walk.set("LF.foot.normal_force", force * WEIGHT)
     # between two rows
@@ -67,7 +67,7 @@ def test_forces_are_in_body_weights_and_the_percentile_is_of_loaded_feet() -> No
 
 
 def landings(
-    walk: Walk, leg: str, times: list[float], rates: list[float], *, rising: float = 0.020
+    walk: SyntheticRun, leg: str, times: list[float], rates: list[float], *, rising: float = 0.020
 ) -> None:
     """Returns touch-downs whose rate rises to its final value within `rising` [s], in body weights
     per second.
@@ -82,14 +82,14 @@ def landings(
 
 
 def test_loading_rate_is_a_percentile_over_landings() -> None:
-    walk = Walk()
+    walk = SyntheticRun()
     # the first two cycles do not count
     landings(walk, "LF", [k + 0.5 for k in range(10)], [1000.0, 1000.0, *range(1, 9)])
     assert walk.metrics()["loading_rate"] == pytest.approx(1.0 + 0.95 * 7.0)
 
 
 def test_a_foot_that_bounces_lands_once_with_the_steeper_rise() -> None:
-    walk = Walk()
+    walk = SyntheticRun()
     landings(walk, "LF", [2.5, 2.55, 3.5, 3.55], [40.0, 10.0, 20.0, 60.0])
     assert walk.metrics()["loading_rate"] == pytest.approx(np.percentile([40.0, 60.0], 95))
 
@@ -99,13 +99,13 @@ def test_touch_downs_more_than_half_a_cycle_apart_are_two_landings(
     apart: float, rate: float
 ) -> None:
     """The metric is the 95th percentile of one landing of 60, or of one of 40 and one of 60."""
-    walk = Walk()
+    walk = SyntheticRun()
     landings(walk, "LF", [4.0, 4.0 + apart], [40.0, 60.0])
     assert walk.metrics()["loading_rate"] == pytest.approx(rate)
 
 
 def test_torque_rms_is_over_all_joints_and_time() -> None:
-    walk = Walk()
+    walk = SyntheticRun()
     walk.grow("LF.femur.torque_squared", 9.0)
     walk.set("LF.femur.torque", 100.0)  # at the rows' moments
     assert walk.metrics()["torque_rms"] == pytest.approx(3.0 / math.sqrt(18.0))
@@ -114,7 +114,7 @@ def test_torque_rms_is_over_all_joints_and_time() -> None:
 def test_heat_is_the_squared_torque_of_all_servos_per_metre_and_the_load_that_of_the_hottest() -> (
     None
 ):
-    walk = Walk()
+    walk = SyntheticRun()
     walk.grow("LF.femur.torque_squared", 9.0)
     walk.grow("RR.tibia.torque_squared", 16.0)
     metrics = walk.metrics()
@@ -123,7 +123,7 @@ def test_heat_is_the_squared_torque_of_all_servos_per_metre_and_the_load_that_of
 
 
 def test_cost_of_transport_counts_what_motors_drive_and_not_what_they_brake() -> None:
-    walk = Walk()
+    walk = SyntheticRun()
     walk.grow("LF.femur.positive_work", 1.0)
     walk.grow("RF.femur.negative_work", 5.0)  # servos do not store it
     assert walk.metrics()["cost_of_transport"] == pytest.approx(1.0 / (0.08 * WEIGHT))
@@ -131,14 +131,14 @@ def test_cost_of_transport_counts_what_motors_drive_and_not_what_they_brake() ->
 
 def test_electrical_cost_adds_the_copper_loss_by_the_motor_constant() -> None:
     """With 0.8 N m/sqrt(W) a torque of 2 N m costs 6.25 W while it stands still."""
-    walk = Walk()
+    walk = SyntheticRun()
     walk.grow("LF.femur.positive_work", 1.0)
     walk.grow("RF.femur.torque_squared", 4.0)
     assert walk.metrics()["electrical_cost"] == pytest.approx(7.25 / (0.08 * WEIGHT))
 
 
 def test_the_first_two_cycles_do_not_count() -> None:
-    clean, dirty = Walk(), Walk()
+    clean, dirty = SyntheticRun(), SyntheticRun()
     early = dirty.time < 2.0 * PERIOD - H / 2
     for name in (
         *foot_names("normal_force"),
@@ -158,14 +158,14 @@ def test_the_first_two_cycles_do_not_count() -> None:
 
 @pytest.mark.parametrize("cycles", [0, 1, 2])
 def test_fewer_than_three_cycles_have_no_figures_but_those_of_the_run(cycles: int) -> None:
-    metrics = Walk(cycles=cycles).metrics()
+    metrics = SyntheticRun(cycles=cycles).metrics()
     assert metrics.pop("realtime_factor") == 42.0
     assert metrics.pop("energy_residual") == 0.0
     assert all(math.isnan(value) for value in metrics.values())
 
 
 def test_the_energy_residual_is_the_largest_over_all_the_work_that_motors_did_and_took() -> None:
-    walk = Walk()
+    walk = SyntheticRun()
     walk.grow("LF.femur.positive_work", 3.0)
     walk.grow("LF.femur.negative_work", 1.0)
     walk.set("energy.residual", np.where(np.abs(walk.time - 5.0) < 0.3 * H, -0.8, 0.2))
@@ -173,7 +173,7 @@ def test_the_energy_residual_is_the_largest_over_all_the_work_that_motors_did_an
 
 
 def test_the_energy_residual_of_a_robot_at_rest_is_measured_by_a_lift_of_a_millimetre() -> None:
-    walk = Walk(speed=0.0)
+    walk = SyntheticRun(speed=0.0)
     walk.set("energy.residual", np.where(walk.time > 0.0, 1e-3 * WEIGHT, 0.0))
     assert walk.metrics()["energy_residual"] == pytest.approx(1.0)
 
@@ -190,7 +190,7 @@ def test_a_value_below_a_millionth_of_its_floor_reads_nought() -> None:
 
 
 def test_the_rating_and_the_motor_constant_are_the_robots() -> None:
-    walk = Walk()
+    walk = SyntheticRun()
     walk.grow("LF.femur.torque_squared", 9.0)
     stronger = replace(SERVO, torque_continuous=3.0, motor_constant=1.5)
     view = View(walk.recording, PARAMETERS, PERIOD)

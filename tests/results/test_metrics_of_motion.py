@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from walks import PERIOD, SPEED, WEIGHT, H, Walk
+from walks import PERIOD, SPEED, WEIGHT, H, SyntheticRun
 
 from hexapod_cosim.cosim.common.files import to_json
 from hexapod_cosim.cosim.master.recorder import Recording
@@ -38,7 +38,7 @@ def test_feet_are_compared_with_their_plan_in_the_torsos_frame() -> None:
 
     Each foot is 3 mm off its plan in stance, one is 6 mm off in swing.
     """
-    walk = Walk(planned=True)
+    walk = SyntheticRun(planned=True)
     yaw, com = 0.9, np.array([0.02, -0.01, 0.03])
     walk.set("torso.quaternion[1]", math.cos(yaw / 2.0))
     walk.set("torso.quaternion[4]", math.sin(yaw / 2.0))
@@ -62,7 +62,7 @@ def test_feet_are_compared_with_their_plan_in_the_torsos_frame() -> None:
 
 
 def test_feet_on_a_slope_have_their_centres_above_the_ground_along_its_normal() -> None:
-    walk, incline, heading = Walk(planned=True), 0.2, 0.7
+    walk, incline, heading = SyntheticRun(planned=True), 0.2, 0.7
     for leg in ("LF", "LM", "LR", "RF", "RM", "RR"):
         for i, part in enumerate(
             [
@@ -83,8 +83,8 @@ def test_feet_on_a_slope_have_their_centres_above_the_ground_along_its_normal() 
 
 
 def test_a_walk_ten_percent_short_has_a_path_error_of_a_ninth() -> None:
-    assert Walk(speed=0.9 * SPEED).metrics()["path_error"] == pytest.approx(0.1 / 0.9)
-    assert Walk().metrics()["path_error"] == pytest.approx(0.0, abs=1e-12)
+    assert SyntheticRun(speed=0.9 * SPEED).metrics()["path_error"] == pytest.approx(0.1 / 0.9)
+    assert SyntheticRun().metrics()["path_error"] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_the_commanded_path_sets_out_along_the_mean_heading_of_a_cycle() -> None:
@@ -92,14 +92,14 @@ def test_the_commanded_path_sets_out_along_the_mean_heading_of_a_cycle() -> None
 
     Its yaw in the first row does not matter.
     """
-    walk = Walk()
+    walk = SyntheticRun()
     walk.set("torso.yaw", 0.1 * np.cos(2.0 * np.pi * walk.time / PERIOD + 0.7))
     assert walk.metrics()["path_error"] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_commanded_circle_is_followed_without_error() -> None:
     rate = 0.3
-    walk = Walk()
+    walk = SyntheticRun()
     yaw = rate * walk.time
     walk.set("command.yaw_rate", rate)
     walk.set("torso.yaw", np.angle(np.exp(1j * yaw)))  # wraps at pi
@@ -112,13 +112,13 @@ def test_a_commanded_circle_is_followed_without_error() -> None:
 
 
 def test_yaw_drift_is_the_heading_lost_per_metre() -> None:
-    walk = Walk()
+    walk = SyntheticRun()
     walk.set("torso.yaw", -0.01 * walk.time)
     assert walk.metrics()["yaw_drift"] == pytest.approx(0.01 / SPEED)
 
 
 def test_the_torso_bobbing_within_a_cycle_walks_no_metre() -> None:
-    walk = Walk()
+    walk = SyntheticRun()
     walk.grow("LF.foot.slip_distance", 0.01)
     walk.set("torso.position[3]", 0.05 * np.sin(2.0 * np.pi * walk.time / PERIOD))
     assert walk.metrics()["slip_per_metre"] == pytest.approx(0.01 / SPEED)
@@ -132,7 +132,7 @@ def test_the_torso_bobbing_within_a_cycle_walks_no_metre() -> None:
 def test_an_oscillation_has_the_rms_of_a_sine_whatever_its_mean(
     column: str, metric: str, h: float
 ) -> None:
-    walk = Walk(h=h)
+    walk = SyntheticRun(h=h)
     walk.set(column, 0.2 + 0.01 * np.sin(2.0 * np.pi * walk.time / PERIOD))
     metrics = walk.metrics()
     assert metrics[metric] == pytest.approx(0.01 / math.sqrt(2.0), rel=1e-9)
@@ -164,9 +164,9 @@ def test_height_above_a_slope_is_the_same_wherever_on_it(heading: float) -> None
     assert body_height(part, flat) == pytest.approx(z - 0.4)
 
 
-def turning(rate: float = 0.3) -> Walk:
+def turning(rate: float = 0.3) -> SyntheticRun:
     """Returns a turn on the spot: the torso moves on a circle of 2 mm, and no walk is commanded."""
-    walk = Walk(speed=0.0)
+    walk = SyntheticRun(speed=0.0)
     walk.set("command.vx", 0.0)
     walk.set("command.yaw_rate", rate)
     walk.set("torso.yaw", np.angle(np.exp(1j * rate * walk.time)))
@@ -194,7 +194,7 @@ def test_turning_on_the_spot_has_figures_per_radian() -> None:
 
 
 def test_a_robot_that_walks_and_turns_has_figures_per_metre() -> None:
-    walk = Walk()
+    walk = SyntheticRun()
     walk.set("command.yaw_rate", 0.3)
     walk.set("torso.yaw", 0.3 * walk.time)
     walk.grow("LF.foot.slip_distance", 0.01)
@@ -208,14 +208,14 @@ def test_a_robot_that_walks_and_turns_has_figures_per_metre() -> None:
 
 
 def test_a_standing_robot_has_no_figures_per_metre_and_json_says_null() -> None:
-    metrics = Walk(speed=0.0).metrics()
+    metrics = SyntheticRun(speed=0.0).metrics()
     assert all(math.isnan(metrics[name]) for name in (*PER_METRE, *TWINS))
     assert metrics["height_rms"] == 0.0
     assert json.loads(to_json(metrics))["slip_per_metre"] is None
 
 
 def test_a_sidestep_is_a_walk_and_no_turn_on_the_spot() -> None:
-    walk = Walk(speed=0.0)
+    walk = SyntheticRun(speed=0.0)
     walk.set("command.vx", 0.0)
     walk.set("command.vy", 0.05)
     walk.set("torso.position[2]", 0.05 * walk.time)
@@ -226,7 +226,7 @@ def test_a_sidestep_is_a_walk_and_no_turn_on_the_spot() -> None:
 
 
 def test_the_commanded_path_turns_with_the_command() -> None:
-    walk = Walk()
+    walk = SyntheticRun()
     walk.set("command.vx", np.where(walk.time < 5.0 - H / 2, 0.1, 0.0))
     walk.set("command.vy", np.where(walk.time < 5.0 - H / 2, 0.0, 0.1))
     path = commanded_path(walk.recording)

@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from walks import DISTANCE, JUDGED, PARAMETERS, PERIOD, SPEED, WEIGHT, Walk
+from walks import DISTANCE, JUDGED, PARAMETERS, PERIOD, SPEED, WEIGHT, SyntheticRun
 
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.interface.plant import load_interface
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 def test_slip_is_what_the_plant_counted_per_metre_walked() -> None:
-    walk = Walk()
+    walk = SyntheticRun()
     walk.grow("LF.foot.slip_distance", 0.010)
     walk.grow("RM.foot.slip_distance", 0.005)
     walk.set("LF.foot.slip_speed", 5.0)  # what the rows show at their moments does not count
@@ -34,7 +34,7 @@ def test_slip_is_what_the_plant_counted_per_metre_walked() -> None:
 @pytest.mark.parametrize("h", [0.005, 0.02, 0.03])  # of 0.03 s no row is at 2 s
 def test_cumulative_figures_depend_on_no_row(h: float) -> None:
     """Steady growth gives the same in the measured time, whether or not rows lie at its ends."""
-    walk = Walk(h=h)
+    walk = SyntheticRun(h=h)
     walk.grow("LF.foot.slip_distance", 0.010)
     walk.grow("LF.femur.positive_work", 3.0)
     walk.grow("LF.femur.torque_squared", 4.0)
@@ -49,7 +49,7 @@ def test_cumulative_figures_depend_on_no_row(h: float) -> None:
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 def test_the_creep_of_the_tanh_law_is_no_net_slip(share: float, load: float) -> None:
     mu, slope, normal = 0.7, 100.0, load * WEIGHT
-    walk = Walk()
+    walk = SyntheticRun()
     walk.set("LF.foot.normal_force", normal)
     walk.set("LF.foot.tangential_force", share * mu * normal)
     walk.set("LF.foot.slip_speed", math.atanh(share) / slope)
@@ -60,7 +60,7 @@ def test_the_creep_of_the_tanh_law_is_no_net_slip(share: float, load: float) -> 
 
 def test_net_slip_is_what_exceeds_the_largest_creep() -> None:
     mu, slope, normal = 0.7, 100.0, 0.3 * WEIGHT
-    walk = Walk()
+    walk = SyntheticRun()
     walk.set("LF.foot.normal_force", normal)
     walk.set("LF.foot.tangential_force", mu * normal)
     walk.set("LF.foot.slip_speed", 0.5)
@@ -82,7 +82,7 @@ def test_net_slip_of_bristles_is_what_they_do_not_give_back(
 
     Velocity along the normal is no slip.
     """
-    walk = Walk()
+    walk = SyntheticRun()
     walk.set("LF.foot.normal_force", 0.3 * WEIGHT)
     for axis, part in (("1", 0.6), ("2", 0.8)):
         walk.set(f"LF.foot.velocity[{axis}]", turn * part * 0.05)
@@ -92,7 +92,7 @@ def test_net_slip_of_bristles_is_what_they_do_not_give_back(
     assert metrics["slip_net_per_metre"] == pytest.approx(net * 0.05 / SPEED, abs=1e-12)
 
 
-def use_cone(walk: Walk, share: float, rate: Array | float = 1.0) -> None:
+def use_cone(walk: SyntheticRun, share: float, rate: Array | float = 1.0) -> None:
     """Adds loaded feet that use this share of the cone, `rate` of them at a time (rows,).
 
     A bin begins at 0.9 (i/30)^2.
@@ -106,7 +106,7 @@ def test_cone_use_is_what_the_plant_counted_over_time() -> None:
 
     What rows show at their moments does not count.
     """
-    walk = Walk()
+    walk = SyntheticRun()
     high = np.where(walk.time % PERIOD < 0.25, 1.0, 0.0)
     use_cone(walk, 0.11, 1.5)
     use_cone(walk, 0.20, 1.0 - high)
@@ -128,7 +128,7 @@ def test_cone_use_is_told_by_percentiles_over_time(
     """From nothing to the largest share, evenly in time: within half a bin at the last
     percentile, much less in between.
     """
-    walk = Walk()
+    walk = SyntheticRun()
     for i in range(30):
         begin, end = 0.9 * (i / 30.0) ** 2, 0.9 * ((i + 1) / 30.0) ** 2
         within = max(min(end, largest) - begin, 0.0) / largest
@@ -142,7 +142,7 @@ def test_cone_use_is_told_by_percentiles_over_time(
 
 @pytest.mark.parametrize(("load", "counts"), [(0.0095, False), (0.0105, True)])
 def test_a_foot_stands_on_a_hundredth_of_the_weight(load: float, counts: bool) -> None:
-    walk = Walk()
+    walk = SyntheticRun()
     walk.set("LF.foot.normal_force", load * WEIGHT)
     metrics = walk.metrics(friction__mu=0.7)
     assert math.isfinite(metrics["force_p95"]) == counts
@@ -153,7 +153,7 @@ def test_a_foot_stands_on_a_hundredth_of_the_weight(load: float, counts: bool) -
     "ground", [{"friction__mu": 0.0}, {"friction__law": 2.0}], ids=["no friction", "no law"]
 )
 def test_a_cone_that_is_not_there_is_not_used(ground: dict[str, float]) -> None:
-    walk = Walk()
+    walk = SyntheticRun()
     use_cone(walk, 0.3)
     metrics = walk.metrics(**ground)
     assert all(
@@ -232,7 +232,7 @@ def test_the_margin_does_not_depend_on_the_worlds_axes(up: tuple[float, float, f
     way = np.array(up) / np.linalg.norm(up)
     # the rows of the third factor are orthonormal; those after the first span the plane
     across = np.linalg.svd(way[None])[2][1:]
-    walk = Walk(cycles=0)
+    walk = SyntheticRun(cycles=0)
     for leg, place in zip(LEG_NAMES, SQUARE @ across, strict=True):
         for name, x in zip(vector_names(f"{leg}.foot.position"), place, strict=True):
             walk.set(name, x)
@@ -245,7 +245,7 @@ def test_the_margin_does_not_depend_on_the_worlds_axes(up: tuple[float, float, f
 
 
 def test_a_robot_on_a_slope_is_judged_along_gravity() -> None:
-    walk = Walk(cycles=0)
+    walk = SyntheticRun(cycles=0)
     for leg, (x, y) in zip(LEG_NAMES, SQUARE, strict=True):
         walk.set(f"{leg}.foot.position[1]", x)
         walk.set(f"{leg}.foot.position[2]", y)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import ctypes as ct
 import math
+import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from hexapod_cosim.models.contact.geometry import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations, applied_forces, external_torques
 from hexapod_cosim.models.files import parse_toml
 from hexapod_cosim.models.kinematics import body_states, joint_models
+from hexapod_cosim.models.mjcf import robot_to_mjcf
 from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.schema import require
 from hexapod_cosim.models.servos.motor import (
@@ -283,3 +285,19 @@ def test_gears_that_slip_leave_out_all_dry_friction() -> None:
             left.append(np.abs(np.diag(plant.system.A)[-ANGLES:]))
     assert np.all(left[0] < 0.02)
     assert np.all(left[1] > 0.05)
+
+
+def test_mjcf_has_viscous_friction_and_the_damping_of_the_back_emf() -> None:
+    robot = with_servo(load_robot("athena"), "mx64_m1")
+    root = ET.fromstring(robot_to_mjcf(robot))
+    joints = root.findall(".//joint[@type='hinge']")
+    damping = [float(joint.get("damping", "")) for joint in joints]
+    assert damping == pytest.approx([0.01169] * 18, abs=1e-5)
+    assert {float(joint.get("frictionloss", "")) for joint in joints} == {
+        robot.servo.coulomb_friction
+    }
+    motors = root.findall("actuator/position")
+    back_emf = 0.66656  # k_t^2/R
+    assert [float(motor.get("kv", "")) for motor in motors] == pytest.approx(
+        [back_emf] * 18, rel=1e-3
+    )

@@ -11,6 +11,7 @@ from hexapod_cosim.controller import Gains, LegSolver, Parts, make_gait
 from hexapod_cosim.controller.comply.force_laws import ForceLaws
 from hexapod_cosim.controller.comply.load_plan import LoadPlan, plan_load
 from hexapod_cosim.controller.comply.support import Support
+from hexapod_cosim.controller.walk.gait_clock import GaitClock
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.models import Robot, load_robot
 
@@ -70,15 +71,16 @@ def plan(
     home = LegSolver(robot).forward(robot.stance)[:, :2] @ np.array([1.0, 1.0j])
     support = Support(robot, make_gait(robot), make_gains(robot).support, rest=still)
     shares, air = support.shares(home, stands.astype(float), still), 1.0 - stands
+    clock = GaitClock(make_gait(robot), period=PERIOD)
+    clock.swinging = ~stands
     laws.planned = plan_load(
         still,
         shares,
+        clock,
         active=laws.parts.support,
         feet=home,
         height=height * air,
         rise=rise * air,
-        swinging=~stands,
-        awaited=np.zeros(6, dtype=np.bool_),
         period=PERIOD,
     )
 

@@ -30,7 +30,7 @@ JUDGED = PERIOD * (CYCLES - 2)  # s    of the cycles of the metrics
 DISTANCE = SPEED * JUDGED  # m    in these
 
 
-class Walk:
+class SyntheticRun:
     """A synthetic recording whose values are zero unless a test sets them; the torso moves along x
     at the commanded speed.
 

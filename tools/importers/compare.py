@@ -36,7 +36,7 @@ from tools.importers.outcome import (
     version,
 )
 from tools.importers.packages import TOOLS, PackageRow, compare_packages
-from tools.importers.walk import STEP, Walk, record
+from tools.importers.walk import STEP, ReferenceRun, record
 
 HERE = Path(__file__).resolve().parent
 ADAPTERS = HERE / "adapters"
@@ -179,7 +179,7 @@ def install_fmi_sim(python: Path) -> str:
     return "" if done.returncode == 0 else last_lines(done.stderr)
 
 
-def run_importer(importer: Importer, walk: Walk, python: Path, *, missing: str = "") -> Row:
+def run_importer(importer: Importer, walk: ReferenceRun, python: Path, *, missing: str = "") -> Row:
     """Runs the walk with one importer; `missing`: why it could not be installed, if known."""
     missing = missing or not_installed(importer.packages, python)
     if missing:
@@ -194,7 +194,7 @@ def run_importer(importer: Importer, walk: Walk, python: Path, *, missing: str =
     return row(importer.name, release, importer.given, found, walk)
 
 
-def row(name: str, release: str, given: str, found: Recording, walk: Walk) -> Row:
+def row(name: str, release: str, given: str, found: Recording, walk: ReferenceRun) -> Row:
     """Compares an importer's outputs with fmpy's."""
     difference, worst = largest_difference(found, walk.reference)
     # importers pass the step size, or the difference of their times
@@ -223,7 +223,7 @@ def largest_difference(found: Recording, reference: Recording) -> tuple[float, s
     return float(relative[worst]), "" if np.array_equal(ours, theirs) else f"worst: {names[worst]}"
 
 
-def show(rows: list[Row], walk: Walk) -> None:
+def show(rows: list[Row], walk: ReferenceRun) -> None:
     """Prints the table of importers."""
     count = walk.reference.data.shape[0] * (walk.reference.data.shape[1] - 1)
     title = f"{len(walk.reference.time)} steps of {STEP:g} s, {count} values, against fmpy"

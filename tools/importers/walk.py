@@ -26,7 +26,7 @@ STEP = DEFAULT_PERIOD  # s
 
 
 @dataclass(frozen=True, kw_only=True)
-class Walk:
+class ReferenceRun:
     """Files in one folder, and the expected outputs of an importer.
 
     reference: fmpy's outputs, a row for each communication point after the first.
@@ -78,7 +78,7 @@ class Walk:
         return Recording(("time", *outputs), found.columns(["time", *outputs]))
 
 
-def record(folder: Path, *, duration: float, robot: str = "athena") -> Walk:
+def record(folder: Path, *, duration: float, robot: str = "athena") -> ReferenceRun:
     """Simulates a compliant walk for `duration` [s] and writes FMU, commands and names of outputs
     to a folder.
     """
@@ -108,7 +108,7 @@ def record(folder: Path, *, duration: float, robot: str = "athena") -> Walk:
         ("time", *names["output"]), recording.columns(["time", *names["output"]])[1:]
     )
     reference = through_fmpy(fmu, commands, names["output"])
-    return Walk(
+    return ReferenceRun(
         folder=folder, fmu=fmu, inputs=inputs, wanted=wanted, reference=reference, recorded=recorded
     )
 

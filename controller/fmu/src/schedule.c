@@ -1,11 +1,11 @@
 /* schedule.c - the public functions of a controller: ticks at their times, saved states, refusals.
  */
-#include <float.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "hexapod/message.h"
+#include "hexapod/range_check.h"
 #include "state.h"
 
 /* A saved state. The FMI layer's header identifies it; the checksum protects the indices of models
@@ -191,30 +191,17 @@ static void tick(hxController *controller, const hxControllerInput *input, int f
   controller->is_ahead = 0;
 }
 
-/* Computes the input some time after it was set, with its rate of change. */
-static void ramp_input(const hxControllerInput *input, const hxControllerInput *rate, double time,
-                       hxControllerInput *now) {
-  double value[sizeof *now / sizeof(double)], slope[sizeof *now / sizeof(double)];
-  memcpy(value, input, sizeof value);
-  memcpy(slope, rate, sizeof slope);
-  for (size_t i = 0; i < sizeof value / sizeof value[0]; ++i) value[i] += slope[i] * time;
-  memcpy(now, value, sizeof value);
-}
-
 hxStatus hx_controller_step(hxController *controller, const hxControllerInput *input,
                             const hxControllerInput *rate, double t_end) {
+  enum { REALS = sizeof *input / sizeof(double) };
   const int before = controller->now;
   const double start = state_of(controller)->time;
-  if (!(t_end >= start && t_end <= DBL_MAX)) {
-    hx_print(controller->message, HX_MESSAGE_SIZE,
-             "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end, start);
-    return HX_INVALID_ARGUMENT;
-  }
-  const hxStatus status = hx_controller_input_check(input, controller->message);
+  hxStatus status = hx_check_end(start, t_end, controller->message);
+  if (status == HX_OK) status = hx_controller_input_check(input, controller->message);
   if (status != HX_OK) return status;
   while (t_end - next_tick(controller) > clock_tolerance * model_of(controller)->plan.period) {
     hxControllerInput ramped;
-    if (rate) ramp_input(input, rate, fmax(next_tick(controller) - start, 0.0), &ramped);
+    if (rate) hx_ramp(input, rate, fmax(next_tick(controller) - start, 0.0), REALS, &ramped);
     tick(controller, rate ? &ramped : input, controller->now == before);
     if (is_finite(&state_of(controller)->output)) {
       if (state_of(controller)->regait) change(controller, state_of(controller)->back);

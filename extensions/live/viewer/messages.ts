@@ -95,10 +95,10 @@ export interface StaticSetup extends Setup {
   readonly first: Settings;
   /** hxControl by name. */
   readonly numbers: Record<string, number>;
-  readonly walks: Record<string, Walk>;
+  readonly walks: Record<string, GaitChanges>;
 }
 
-interface Walk {
+interface GaitChanges {
   /** Pattern, period, duty, step height, touch-down speed. */
   readonly gait: number[];
   readonly limits: Limits;

@@ -1,9 +1,6 @@
-/* robot.c - the default robot with its controller, for a page that steps them without a server
- *
- * extensions/live/static_page.py compiles it to WebAssembly with the cores of plant and controller
- * and with the macro-step that all loops in C share. There is one robot in a module. SI units,
- * frames and orders as in hexapod.h. Functions return 0, or the status of a failure.
- */
+/* robot.c - the default robot with its controller, for a page that steps them without a server.
+ * static_page.py compiles it to WebAssembly with plant, controller and the macro-step of all loops.
+ * Units, frames and orders as in hexapod.h. Functions return 0, or the status of a failure. */
 #include <stddef.h>
 #include <string.h>
 
@@ -29,6 +26,10 @@ enum {
   INPUT = TORSO + 16,
   VALUES = INPUT + INPUTS
 };
+enum { REAL = sizeof(double), TORSO_END = offsetof(hxOutput, torso.contact_force) };
+_Static_assert(offsetof(hxOutput, positive_work) == FORCE * REAL, "angles to torques");
+_Static_assert(TORSO_END - offsetof(hxOutput, torso) == (INPUT - TORSO) * REAL, "torso");
+_Static_assert(offsetof(hxInput, push_force) == DRIVES * REAL, "joint commands");
 
 static hxPlant *plant;
 static hxController *controller;

@@ -1,4 +1,4 @@
-/* range_check.h - range checks of definitions and inputs, shared by the plant and the controller.
+/* range_check.h - checks and ramps of definitions and inputs, shared by all components.
  * Users of their headers do not need it. */
 #ifndef HEXAPOD_RANGE_CHECK_H
 #define HEXAPOD_RANGE_CHECK_H
@@ -20,6 +20,12 @@ void hx_check_fail(hxChecker *checker, const char *name, double got, const char 
 
 /* Fails for the first of n numbers that is outside its range. NaN is outside every range. */
 void hx_check_ranges(hxChecker *checker, const void *structure, const hxRange *range, size_t n);
+
+/* Returns HX_OK if a step from a time may end at t_end [s]; otherwise writes a message. */
+hxStatus hx_check_end(double time, double t_end, char *message);
+
+/* Computes n inputs some time after they were set, with their rates of change. */
+void hx_ramp(const void *input, const void *rate, double time, size_t n, void *now);
 
 /* Returns the name of a leg, for example "LF". */
 const char *hx_leg_name(int leg);

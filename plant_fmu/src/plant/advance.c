@@ -1,4 +1,4 @@
-#include <float.h>
+/* advance.c - hx_plant_step: a call in parts, from one transmission of the bus to the next */
 #include <math.h>
 #include <string.h>
 
@@ -6,6 +6,7 @@
 #include "../kernel.h"
 #include "../robot/robot.h"
 #include "hexapod/message.h"
+#include "hexapod/range_check.h"
 #include "hexapod/status.h"
 #include "parts.h"
 
@@ -40,11 +41,8 @@ static const double most_parts = 1e6; /* 1  transmissions of the bus within a ca
 /* Returns whether a call to t_end is possible, else writes why not. */
 static hxStatus check_end(hxPlant *plant, double t_end) {
   const double time = plant->state.time, period = plant->model.bus_period;
-  if (!(t_end >= time && t_end <= DBL_MAX)) {
-    hx_print(plant->message, HX_MESSAGE_SIZE,
-             "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end, time);
-    return HX_INVALID_ARGUMENT;
-  }
+  const hxStatus status = hx_check_end(time, t_end, plant->message);
+  if (status != HX_OK) return status;
   if (!(period > 0.0 && (t_end - time) / period > most_parts)) return HX_OK;
   hx_print(plant->message, HX_MESSAGE_SIZE,
            "servo.bus_period: got %.3g s, which makes %.3g transmissions in this call, expected at "

@@ -297,17 +297,6 @@ static inline hxPlane landing(const hxFootPathsModel *model, const hxFootPaths *
                       travel(twist, ahead));
 }
 
-/* Computes displacement and turn of the walking frame since the start of the walk (C3). */
-static inline void odometry(double period, const hxPlannedFeet *before, hxTwist twist,
-                            hxPlannedFeet *feet) {
-  const hxTwist *last = &before->twist;
-  const hxTwist mean = {hx_scaled(hx_plane_add(twist.velocity, last->velocity), 0.5),
-                        0.5 * (twist.yaw_rate + last->yaw_rate)};
-  feet->turn = before->turn + mean.yaw_rate * period;
-  feet->way = hx_plane_add(before->way, hx_times(hx_cis(before->turn), travel(mean, period)));
-  feet->twist = twist;
-}
-
 /* Computes the feet a number of periods after the first step of the section, from the step before.
  */
 static inline void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFootPaths *paths,
@@ -317,7 +306,12 @@ static inline void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFoo
     *feet = *before;
     return;
   }
-  odometry(model->period, before, twist, feet);
+  hxPlane way;
+  double yaw;
+  odometry(before->twist, twist, model->period, &way, &yaw);
+  feet->turn = before->turn + yaw;
+  feet->way = hx_plane_add(before->way, hx_times(hx_cis(before->turn), way));
+  feet->twist = twist;
   const hxPlane turn = hx_cis(feet->turn), back = hx_conj(turn);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     feet->phase[leg] =

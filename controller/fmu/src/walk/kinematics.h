@@ -194,9 +194,9 @@ static inline int hx_leg_solver_solve(const hxLegSolver *model, const hxPose *po
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     angle[joint] = hx_clamp(pose->angle[joint], model->angle_min[joint], model->angle_max[joint]);
     /* a joint that its limit holds has no speed */
-    const int held = !(fabs(pose->angle[joint] - angle[joint]) <= flag_tolerance);
-    speed[joint] = held ? 0.0 : hx_clamp(speed[joint], -model->speed_max, model->speed_max);
-    missed |= held;
+    const int limited = !(fabs(pose->angle[joint] - angle[joint]) <= flag_tolerance);
+    speed[joint] = limited ? 0.0 : hx_clamp(speed[joint], -model->speed_max, model->speed_max);
+    missed |= limited;
   }
   return missed;
 }
@@ -212,10 +212,10 @@ static inline void hx_leg_solver_accelerations(const hxLegSolver *model, const h
   const double most = 2.0 * model->speed_max / fabs(ahead);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     const double low = model->angle_min[joint], high = model->angle_max[joint];
-    const int held =
+    const int limited =
         angle[joint] <= low || angle[joint] >= high || fabs(speed[joint]) >= model->speed_max;
     acceleration[joint] = 0.0;
-    if (held || !neighbour) continue;
+    if (limited || !neighbour) continue;
     const double way =
         hx_clamp(neighbour->angle[joint], low, high) - angle[joint] - ahead * speed[joint];
     acceleration[joint] = hx_clamp(2.0 * way / (ahead * ahead), -most, most);

@@ -40,4 +40,14 @@ static inline hxPlane travel(hxTwist twist, double time) {
   return hx_times(hx_scaled(twist.velocity, time * chord), turned);
 }
 
+/* Computes displacement [m] and turn [rad] of the walking frame over a period [s] (C3). last: the
+ * motion of the body at its begin; twist: at its end. */
+static inline void odometry(hxTwist last, hxTwist twist, double period, hxPlane *way,
+                            double *turn) {
+  const hxTwist mean = {hx_scaled(hx_plane_add(twist.velocity, last.velocity), 0.5),
+                        0.5 * (twist.yaw_rate + last.yaw_rate)};
+  *way = travel(mean, period);
+  *turn = mean.yaw_rate * period;
+}
+
 #endif

@@ -1,7 +1,6 @@
 /* policy.c - a policy: its action a = V tanh(W x + w) + v, ticks, saved states, refusals. */
 #include "hexapod/policy.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -160,31 +159,18 @@ void hx_policy_output(const hxPolicy *policy, const hxPolicyInput *input, hxPoli
     act(&policy->definition, input, tick, output);
 }
 
-/* Computes the input some time after it was set, with its rate of change. */
-static void ramp_input(const hxPolicyInput *input, const hxPolicyInput *rate, double time,
-                       hxPolicyInput *now) {
-  double value[sizeof *now / sizeof(double)], slope[sizeof *now / sizeof(double)];
-  memcpy(value, input, sizeof value);
-  memcpy(slope, rate, sizeof slope);
-  for (size_t i = 0; i < sizeof value / sizeof value[0]; ++i) value[i] += slope[i] * time;
-  memcpy(now, value, sizeof value);
-}
-
 hxStatus hx_policy_step(hxPolicy *policy, const hxPolicyInput *input, const hxPolicyInput *rate,
                         double t_end) {
+  enum { REALS = sizeof *input / sizeof(double) };
   hxPolicyState *state = &policy->state;
   const double begin = state->time, tolerance = clock_tolerance * policy->definition.period;
   hxPolicyInput now = *input;
-  if (!(t_end >= begin && t_end <= DBL_MAX)) {
-    hx_print(policy->message, HX_MESSAGE_SIZE,
-             "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end, begin);
-    return HX_INVALID_ARGUMENT;
-  }
-  const hxStatus status = check_input(input, policy->message);
+  hxStatus status = hx_check_end(begin, t_end, policy->message);
+  if (status == HX_OK) status = check_input(input, policy->message);
   if (status != HX_OK) return status;
   while (t_end - (state->start + next_tick(policy)) > tolerance) {
     const double tick = next_tick(policy);
-    if (rate) ramp_input(input, rate, fmax(state->start + tick - begin, 0.0), &now);
+    if (rate) hx_ramp(input, rate, fmax(state->start + tick - begin, 0.0), REALS, &now);
     act(&policy->definition, &now, tick, &state->output);
     ++state->tick;
   }

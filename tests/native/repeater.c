@@ -1,7 +1,7 @@
-/* walker.c - loads an FMU's binary, drives it with recorded inputs and prints its outputs bit by
+/* repeater.c - loads an FMU's binary, drives it with recorded inputs and prints its outputs bit by
  * bit.
  *
- * usage: walker LIBRARY GUID RESOURCES INPUTS
+ * usage: repeater LIBRARY GUID RESOURCES INPUTS
  * INPUTS contains, separated by spaces: number of inputs and their references, number of outputs
  * and theirs, number of steps, step size, then the inputs of each step; Reals as 64-bit patterns in
  * hexadecimal. Prints a line of such patterns for each step. Exits with 0 when every call
@@ -48,7 +48,7 @@ static void log_line(fmi2ComponentEnvironment environment, fmi2String name, fmi2
 }
 
 static int fail(const char *what) {
-  fprintf(stderr, "walker: %s\n", what);
+  fprintf(stderr, "repeater: %s\n", what);
   return 1;
 }
 
@@ -132,7 +132,7 @@ static int run(void *library, const char *guid, const char *resources, FILE *inp
 }
 
 int main(int argc, char **argv) {
-  if (argc != 5) return fail("usage: walker LIBRARY GUID RESOURCES INPUTS");
+  if (argc != 5) return fail("usage: repeater LIBRARY GUID RESOURCES INPUTS");
   void *library = load(argv[1]);
   FILE *inputs = fopen(argv[4], "r");
   if (!library || !inputs) return fail(library ? "no inputs" : "library not loaded");

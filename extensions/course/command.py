@@ -19,7 +19,7 @@ from hexapod_cosim.cosim.cli.options import (
     Workers,
     command_line,
 )
-from hexapod_cosim.cosim.cli.running import given_gains
+from hexapod_cosim.cosim.cli.runs import given_gains
 from hexapod_cosim.cosim.cli.terminal import (
     counting_bar,
     show_files,

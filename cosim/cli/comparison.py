@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
-from hexapod_cosim.cosim.cli.running import (
+from hexapod_cosim.cosim.cli.runs import (
     RunOptions,
     Words,
     check_accuracy,

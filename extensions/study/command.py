@@ -10,7 +10,7 @@ import typer
 
 from hexapod_cosim.cosim.cli.failures import FELL
 from hexapod_cosim.cosim.cli.options import ControlNames, FmuFile, GainsFile, Json
-from hexapod_cosim.cosim.cli.running import Words, given_gains
+from hexapod_cosim.cosim.cli.runs import Words, given_gains
 from hexapod_cosim.cosim.common.installation import require_pyarrow
 
 EPILOG = (

@@ -1,4 +1,4 @@
-"""Defines the command `hexapod list`."""
+"""Defines `hexapod list` and `hexapod terrain`, which show what there is."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Annotated
 
 import typer
 
+from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.extension import Rows, list_functions, loaded
-from hexapod_cosim.cosim.cli.options import Json
+from hexapod_cosim.cosim.cli.options import Json, RobotName
 
 
 def robots() -> Rows:
@@ -159,3 +160,31 @@ def list_what(what: What, json: Json = False) -> None:
 
 def _text(value: str | float) -> str:
     return value if isinstance(value, str) else f"{value:.4g}"
+
+
+def terrain(
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME",
+            help="A surface of `hexapod list terrains`.",
+            autocompletion=completion.surface,
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE", help="Draw the surface as PNG or SVG."),
+    ] = None,
+    values: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="Set a parameter of the surface: step_height=30mm."
+        ),
+    ] = None,
+    robot: RobotName = "athena",
+    json: Json = False,
+) -> None:
+    """Show a surface: its size and parameters, and its picture beside a robot."""
+    from hexapod_cosim.cosim.cli.terrains import show_terrain, surface_from
+
+    show_terrain(surface_from(name, values or []), robot=robot, picture=output, as_json=json)

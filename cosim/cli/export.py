@@ -1,4 +1,4 @@
-"""Defines `hexapod export`, which writes FMUs, packages and robot descriptions."""
+"""Defines `hexapod export`, which writes FMUs and packages, and `hexapod validate`."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def export(
     """Pack the plant FMU of a robot, or its controller's, or both as a package, or write the
     robot for other tools.
     """
-    from hexapod_cosim.cosim.cli.exporting import Request, write_export
+    from hexapod_cosim.cosim.cli.exports import Request, write_export
 
     request = Request(
         context=context,
@@ -127,3 +127,22 @@ def export(
         period=period,
     )
     write_export(request, as_json=json)
+
+
+def validate(
+    fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The FMU to check.")],
+    json: Json = False,
+) -> None:
+    """Check an FMU of ours and say what is wrong."""
+    from hexapod_cosim.cosim.cli.terminal import show_json
+    from hexapod_cosim.cosim.export.validation import UnsoundFmuError, find_problems
+
+    problems = find_problems(fmu)
+    if problems:
+        if not json:
+            print("\n".join(problems))
+        raise UnsoundFmuError(fmu, problems)
+    if json:
+        show_json({"fmu": str(fmu), "valid": True, "problems": []})
+    else:
+        print(f"{fmu}: no problems found")
