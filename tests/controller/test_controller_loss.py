@@ -295,7 +295,7 @@ def test_the_leg_opposite_a_lost_one_steps_first(
 ) -> None:
     """Opposite legs are LF and RR, LM and RM, LR and RF; two lost legs have two opposite ones."""
     gait = gait_without(make_gait(ROBOT), mask(*absent), backwards=False)
-    paths = FootPaths(gait, SOLVER.forward(ROBOT.stance), period=H)
+    paths = FootPaths(gait, SOLVER, period=H)
     feet = paths.reset()
     paths.clock.walking, paths.clock.absent = True, mask(*absent)
     paths.join(feet)
