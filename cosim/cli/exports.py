@@ -23,7 +23,6 @@ from hexapod_cosim.models.urdf.writer import robot_to_urdf
 FORMATS: dict[str, Callable[[Robot], str]] = {"urdf": robot_to_urdf, "mjcf": robot_to_mjcf}
 SUFFIXES = {"urdf": ".urdf", "mjcf": ".xml", "ssp": ".ssp"}  # of what is no FMU
 DEFAULT_CONTROL = "compliant"  # of a package
-SUFFIXES = {"urdf": ".urdf", "mjcf": ".xml", "ssp": ".ssp", "fmu": ".fmu"}
 CONTROLLER_OPTIONS = ("gait", "gains", "period")
 DESCRIPTION, PLANT_FMU = "a robot's description", "the plant's FMU"
 CONTROLLER_FMU, PACKAGE = "a controller's FMU", "a package"
