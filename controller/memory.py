@@ -16,10 +16,10 @@ class Stateful:
 
     def save(self) -> dict[str, Any]:
         """Returns the state that restore() takes."""
-        held = {name: getattr(self, name) for name in self.STATE}
+        values = {name: getattr(self, name) for name in self.STATE}
         return {
             name: value.save() if isinstance(value, Stateful) else value
-            for name, value in held.items()
+            for name, value in values.items()
         }
 
     def restore(self, state: dict[str, Any]) -> None:

@@ -45,6 +45,7 @@ from hexapod_cosim.cosim.scenario.controls import (
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.tables import read_tables, with_values
+from hexapod_cosim.models.errors import check_type
 
 
 def simulate(
@@ -78,6 +79,9 @@ def simulate(
     Warns:
         RuntimeWarning: the run ended early, with the reason: its metrics are NaN.
     """
+    check_type(scenario, (str, Path, Scenario), "a name, a path or a Scenario", where="scenario")
+    check_type(settings or {}, Mapping, "a dict of values by name", where="settings")
+    check_type(gains or "", (str, Path, Gains), "gains or the path of their file", where="gains")
     text = controller.text if isinstance(controller, Control) else controller
     text = text if isinstance(text, str) else None
     law = None if text is not None else controller
@@ -106,7 +110,8 @@ def _scenario(
         table, where = read_tables(scenario)
     if text is not None:
         table = table_with_control(table, parse_control(text, where="controller").text)
-    return scenario_from_table(with_values(table, settings), where=where, given=list(settings))
+    changed = with_values(table, settings, "settings")
+    return scenario_from_table(changed, where=where, given=list(settings))
 
 
 def report(results: Result | Sequence[Result], folder: str | Path) -> Path:
@@ -116,7 +121,11 @@ def report(results: Result | Sequence[Result], folder: str | Path) -> Path:
     An earlier run's files in the folder are replaced. Raises HexapodError when a run did not
     complete, when two runs have one label, and when the folder cannot be used.
     """
+    kinds, expected = (Result, Sequence), "a result of simulate(), or several"
+    check_type(results or None, kinds, expected, where="results")
     runs = [results] if isinstance(results, Result) else list(results)
+    for run in runs:
+        check_type(run, Result, expected, where="results")
     labels = [
         control.label
         for control in distinct_controls(

@@ -1,4 +1,6 @@
-"""Computes energies and momentum of all bodies, and the mobility of links and joints."""
+"""Computes energies and momentum of all bodies, T and V of the energy audit (eq. 26), and the
+mobility of links and joints.
+"""
 
 from __future__ import annotations
 

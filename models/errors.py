@@ -67,8 +67,29 @@ def shortened(text: str) -> str:
     return f"{text[:half]} ... ({len(text)} characters) ... {text[-half:]}"
 
 
+def check_type(
+    value: object,
+    kinds: type | tuple[type, ...],
+    expected: str,
+    *,
+    where: str,
+    error: type[HexapodError] = HexapodError,
+) -> None:
+    """Raises an error for an argument of another type. where: the argument's name."""
+    if isinstance(value, kinds):
+        return
+    raise error(
+        "wrong type of an argument",
+        got="nothing (None)" if value is None else value,
+        expected=expected,
+        fix=f"give {expected}",
+        where=where,
+    )
+
+
 def refuse_path(path: str | PathLike[str], what: str, error: type[HexapodError]) -> None:
     """Raises an error for a path that no system can open: with a NUL, or too long."""
+    check_type(path, (str, PathLike), f"a path of {what}, or a name", where="path", error=error)
     text = fspath(path)
     longest = max(len(part.encode("utf-8", "surrogatepass")) for part in text.split("/"))
     if "\0" not in text and longest <= NAME_SIZE and len(text) <= PATH_SIZE:
@@ -125,7 +146,7 @@ def unknown_name(
     """
     names = list(valid)
     near = nearest_name(name, names)
-    fix = f"did you mean {near!r}?" if near else f"choose one of the {len(names)} valid names"
+    fix = f"did you mean {near!r}?" if near else "write one of these names"
     return error(
         f"unknown {kind}", got=name, expected=f"one of {', '.join(names)}", fix=fix, where=where
     )

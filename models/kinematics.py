@@ -33,7 +33,7 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def rotation_matrix(p: Array) -> Array:
-    """Returns the rotation (3, 3), body to world, of a quaternion [w x y z] of any length."""
+    """Returns the rotation (3, 3), body to world, of a quaternion of any length (eq. 5)."""
     w, x, y, z = (p / math.sqrt(p @ p)).tolist()
     return np.array(
         [

@@ -268,7 +268,7 @@ class Compliant(Stateful):
         output.angle_ref[...] = self._correct(output.angle_ref, climb, raised)
         output.torque_ref[...] = laws.torque
         self.adaptation.weigh(laws.heft)
-        self.adaptation.step(laws.torque, laws.needed(), laws.held)
+        self.adaptation.step(laws.torque, laws.needed(), laws.squeeze_share)
         if busy or self.moving:
             rise = (offset - self.offset) * self.per_second
             speed, most = output.speed_ref + climb * rise[:, None], self.legs.speed_max

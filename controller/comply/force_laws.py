@@ -55,14 +55,14 @@ class ForceLaws(Stateful):
         regaining: some grip may be below 1 (scalar).
         scale: measured over planned weight (scalar) [1].
         lean: of the measured centre of mass from the modelled one, x + i y (scalar) [m].
-        held: share of the planned squeeze that the ground holds (scalar) [1].
+        squeeze_share: of the planned squeeze, that the ground holds (scalar) [1].
         sure: scale, lean and heft before a sensor contradicted the plan (scalars).
     """
 
     STATE = (
         "detector", "watch", "touchdown", "landings", "burden", "trust", "load", "torque",
         "contact", "carrying", "doubted", "misled", "fallback", "grip", "regaining", "scale",
-        "lean", "held", "sure",
+        "lean", "squeeze_share", "sure",
     )  # fmt: skip
 
     def __init__(
@@ -109,7 +109,7 @@ class ForceLaws(Stateful):
         self.contact, self.carrying, self.doubted = np.zeros((3, LEGS), np.bool_)
         self.misled, self.fallback = np.zeros((2, LEGS), np.bool_)
         self.grip, self.regaining = np.ones(LEGS), False
-        self.scale, self.lean, self.held = 0.0, 0j, 1.0
+        self.scale, self.lean, self.squeeze_share = 0.0, 0j, 1.0
         self.sure = 1.0, 0j, 1.0
 
     @property
@@ -144,9 +144,8 @@ class ForceLaws(Stateful):
         most = np.maximum(self.share, LIKELY * self.scale * plan.shares.normal)
         known = float(np.minimum(force[:, 2], most)[self.doubted & ~high].sum())
         total = np.where(self.doubted, reported, reported + known)
-        doubted = self.watch.update(
-            self.detector.contact, total, plan.standing | plan.awaited, high
-        )
+        loaded = plan.standing | plan.awaited
+        doubted = self.watch.update(self.detector.contact, total, loaded, high)
         blind = np.count_nonzero(doubted) >= TRIPOD_LEGS
         doubted = doubted | blind
         fresh = doubted & ~self.doubted
@@ -185,8 +184,7 @@ class ForceLaws(Stateful):
     def _squeeze_lost(self, plan: LoadPlan, deviation: Plane) -> float:
         """Returns the share of the planned squeeze that creep has taken away, in [0, 1] (C46).
 
-        deviation: (6,) of the tangential forces from the planned ones [N]. Without planned squeeze
-        it is 0.
+        deviation: (6,) of the tangential forces from the planned ones [N].
         """
         planned = np.where(self.contact, self.scale * plan.shares.squeeze, 0.0)
         whole = float(square(planned).sum())
@@ -210,7 +208,7 @@ class ForceLaws(Stateful):
             self.fallback = np.full(LEGS, goal == 0.0)
         self.load = self.load + self.follow_load * (normal / self.share - self.load)
         missing = self._squeeze_lost(plan, deviation)
-        self.held += self.follow_cycle * (1.0 - missing - self.held)
+        self.squeeze_share += self.follow_cycle * (1.0 - missing - self.squeeze_share)
         return normal, total
 
     def _update_lean(self, plan: LoadPlan, normal: Array, total: float) -> None:

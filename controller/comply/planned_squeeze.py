@@ -63,8 +63,8 @@ class PlannedSqueeze:
         *system, twist = np.array((xx, xy, tx, yy, ty, turning, twists)).sum(axis=1).tolist()
         total = change.sum()
         a, b, c = solve(system, (total.real, total.imag, twist))
-        held = xx * a + xy * b + tx * c + 1j * (xy * a + yy * b + ty * c)
-        return np.asarray(change - held)
+        carried = xx * a + xy * b + tx * c + 1j * (xy * a + yy * b + ty * c)
+        return np.asarray(change - carried)
 
     def _limit(self, shares: Shares, change: Plane) -> float:
         """Returns the factor on all changes (6,) that keeps each foot within its friction (C43)."""

@@ -78,11 +78,11 @@ class LoadAdaptation(Stateful):
         """Returns measured over modelled weight, 1 in the wide stance [1] (C53)."""
         return 1.0 + self.narrowing * (self.heft - 1.0)
 
-    def step(self, torque: Array, needed: float, held: float) -> None:
+    def step(self, torque: Array, needed: float, squeeze_share: float) -> None:
         """Advances by one period, after weigh() (C45).
 
         torque: (6, 3) feed-forward torques [N m]; needed: largest torque that the measured weight
-        needs, over the largest that is allowed [1]; held: share of the planned squeeze that the
+        needs, over the largest that is allowed [1]; squeeze_share: of the planned squeeze, that the
         ground holds [1].
         """
         square = torque * torque
@@ -92,7 +92,7 @@ class LoadAdaptation(Stateful):
             (float(self.heat.max()) / self.rating - COOL) / (HOT - COOL),
             (float(self.work.max()) / self.rating - OVER) / (FAR_OVER - OVER),
             (needed - EASY) / (HARD - EASY),
-            (held - CREEPS) / (HOLDS - CREEPS) * (1.0 - self.narrowing),
+            (squeeze_share - CREEPS) / (HOLDS - CREEPS) * (1.0 - self.narrowing),
         )
         least = self.cool_squeeze * (1.0 - SPARED * self.narrowing)
         more = max(MOST_SQUEEZE - least, 0.0) if least > 0.0 else 0.0

@@ -68,8 +68,8 @@ class Touchdown(Stateful):
         eager = np.minimum(self.waited / PATIENCE, 1.0) ** 2
         pace = REACH_SPEED * np.where(self.late > GRACE, 1.0, eager * eager)
         reached = np.maximum(self.offset - pace * self.period, -REACH_LIMIT)
-        held = np.minimum(self.offset + falling, HOLD_LIMIT)
-        in_swing = np.where(contact, np.where(falling > 0.0, held, self.offset), self._faded())
+        raised = np.minimum(self.offset + falling, HOLD_LIMIT)
+        in_swing = np.where(contact, np.where(falling > 0.0, raised, self.offset), self._faded())
         moved = np.where(swinging, in_swing, self.offset)
         return np.where(searching | (self.late > GRACE), reached, moved)
 

@@ -86,14 +86,16 @@ def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[s
     return with_values(table, read_overrides(overrides))
 
 
-def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+def with_values(
+    table: Mapping[str, Any], values: Mapping[str, Any], where: str = "--set"
+) -> dict[str, Any]:
     """Returns a copy of the tables with each value set by name, as --set does.
 
-    Raises ScenarioError.
+    where: the option or argument with the values, for the message. Raises ScenarioError.
     """
     changed = deepcopy(dict(table))
     for name, value in values.items():
-        _set(changed, name, value)
+        _set(changed, name, value, where)
     return changed
 
 
@@ -108,7 +110,7 @@ def parse_value(value: str) -> Any:
         return float(value) if POINTED.fullmatch(value) else value
 
 
-def _set(table: dict[str, Any], name: str, value: Any) -> None:
+def _set(table: dict[str, Any], name: str, value: Any, where: str) -> None:
     """Sets a key of the scenario or an FMU parameter by its dotted name, in place."""
     section, dot, key = name.partition(".")
     if name == "control" and isinstance(table.get(name), dict):
@@ -127,7 +129,7 @@ def _set(table: dict[str, Any], name: str, value: Any) -> None:
                 got=name,
                 expected=f"a table [{section}]",
                 fix=fix,
-                where="--set",
+                where=where,
             )
         inner[key] = value
     elif dot or "[" in name:
@@ -136,11 +138,11 @@ def _set(table: dict[str, Any], name: str, value: Any) -> None:
         raise ScenarioError(
             "a section, which has keys",
             got=f"{name}={value}",
-            expected=f"--set {name}.KEY=VALUE",
-            fix=f"write --set {name}.{next(iter(specs(SETTINGS[name])))}={value}",
-            where="--set",
+            expected=f"{name}.KEY=VALUE",
+            fix=f"write {name}.{next(iter(specs(SETTINGS[name])))}={value}",
+            where=where,
         )
     elif name in KEYS:
         table[name] = value
     else:
-        raise unknown_name("setting", name, KEYS, where="--set", error=ScenarioError)
+        raise unknown_name("setting", name, KEYS, where=where, error=ScenarioError)

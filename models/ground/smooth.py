@@ -1,4 +1,4 @@
-"""Computes the height of a smooth surface and its nearest point.
+"""Computes the height of a smooth surface (eq. 32) and its nearest point (eq. 31, 33).
 
 Between four nodes the surface is the bicubic polynomial with Catmull-Rom slopes: the slope at a
 node is the difference of its neighbours over two cells. Nodes beyond the border follow from linear

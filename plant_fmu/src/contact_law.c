@@ -1,3 +1,5 @@
+/* contact_law.c - damping at touch-down (models/contact/law.py) and the switching of contacts
+ * (models/contact/switching.py) */
 #include "contact_law.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* elementary.c - series for sine, cosine and logarithm; the power is that of ground/power.h */
 #include "elementary.h"
 
 #include <math.h>

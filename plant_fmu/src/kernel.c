@@ -1,3 +1,4 @@
+/* kernel.c - chooses the kernel of this processor, and divides a plant's work space */
 #include "kernel.h"
 
 #include <stddef.h>

@@ -1,3 +1,4 @@
+/* message.c - prints messages with a decimal point in every locale */
 #include "hexapod/message.h"
 
 #include <stdio.h>

@@ -1,3 +1,4 @@
+/* method.c - coefficients of the methods; models/method.py has the same ones */
 #include "method.h"
 
 #include <stddef.h>

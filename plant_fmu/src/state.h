@@ -118,10 +118,13 @@ typedef struct hxModel {
   int measured_friction;            /* 1: the gears have more than Coulomb friction */
   int stribeck;                     /* 1: it has Stribeck terms */
   int spin;                         /* 1: the rotors have angular momentum (eq. 54) */
-  int has_soil; /* 1: the ground may be soil, of the definition or of a material of the terrain */
-  int rows, foot_rows, torso_rows; /* computed: on tibias, of these on feet, on the torso (0, 1) */
-  int pair_rows, listed;           /* between legs (0 or HX_PAIR_ROWS); all together */
-  int row[HX_ROWS];                /* rows that are computed: on feet, tibias, torso, of pairs */
+  int has_soil;   /* 1: the ground may be soil, of the definition or of a material of the terrain */
+  int rows;       /* computed rows of contacts on tibias, those on feet included */
+  int foot_rows;  /* computed rows on feet */
+  int torso_rows; /* computed rows on the torso: 0 or 1 */
+  int pair_rows;  /* computed rows between legs: 0 or HX_PAIR_ROWS */
+  int listed;     /* all computed rows: rows + torso_rows + pair_rows */
+  int row[HX_ROWS]; /* numbers of the computed rows: first of feet, then tibias, torso, pairs */
   union {
     const hxTerrain *terrain; /* NULL: plane; not saved */
     int64_t terrain_bits;     /* the same size on every machine */
@@ -305,8 +308,8 @@ typedef struct hxState {
 struct hxPlant {
   hxModel model;
   /* the model with the rows of feet alone: open contacts exert no force, so steps without their
-   * rows have the same bits. A reset keeps the model before it here, which one that fails restores
-   */
+   * rows have the same bits. While hx_plant_reset and hx_plant_tune run, it holds the model from
+   * before the call instead, because a further model would enlarge every instance */
   hxModel feet;
   hxState state;
   const hxTerrain *terrain; /* of later resets */

@@ -16,11 +16,11 @@ import pytest
 from command import Call, assert_refused
 
 import hexapod_cosim
-from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
+from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Measurement, make_gait
 from hexapod_cosim.cosim.control.new_law import class_name, module_name, write_law
 from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.metric_table import METRICS
-from hexapod_cosim.models import HexapodError, Robot
+from hexapod_cosim.models import HexapodError, Robot, load_robot
 
 NEEDS_PUBLIC_CALL = pytest.mark.usefixtures("plant_build")
 SHORT = {"duration": 0.3}
@@ -190,3 +190,37 @@ def test_the_pattern_generator_walks_forward_and_turns(plant_build: Path) -> Non
     assert turning.recording.column("torso.yaw")[-1] == pytest.approx(0.7, rel=0.35)
     torso = turning.recording.vector("torso.position")
     assert np.linalg.norm(np.diff(torso[:, :2], axis=0), axis=1).sum() > 0.2  # m    of its arc
+
+
+@pytest.mark.parametrize(
+    ("arguments", "where"),
+    [
+        ({"scenario": None}, "scenario: wrong type of an argument: got 'nothing (None)'"),
+        ({"scenario": 3}, "scenario: wrong type of an argument: got 3"),
+        ({"settings": ["duration=3"]}, "settings: wrong type of an argument: got ['duration=3']"),
+        ({"gains": 3}, "gains: wrong type of an argument: got 3"),
+        ({"settings": {"duratoin": 3}}, "settings: unknown setting: got 'duratoin'"),
+    ],
+)
+def test_arguments_of_another_type_are_refused(arguments: dict[str, Any], where: str) -> None:
+    with pytest.raises(HexapodError) as refused:
+        hexapod_cosim.simulate(**arguments)
+    assert str(refused.value).startswith(where)
+    assert "expected" in str(refused.value)
+
+
+@pytest.mark.parametrize("results", [3, [], [3]])
+def test_a_report_of_no_result_is_refused(results: Any, tmp_path: Path) -> None:
+    with pytest.raises(HexapodError, match="results: wrong type of an argument"):
+        hexapod_cosim.report(results, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_controller_of_no_gait_and_a_robot_of_no_name_are_refused() -> None:
+    robot = load_robot("athena")
+    with pytest.raises(HexapodError, match="gait: wrong type of an argument"):
+        Controller(robot, period=0.005, gait="tripod")  # type: ignore[arg-type]
+    with pytest.raises(HexapodError, match="period: wrong type of an argument"):
+        Controller(robot, period="5 ms", gait=make_gait(robot))  # type: ignore[arg-type]
+    with pytest.raises(HexapodError, match="path: wrong type of an argument"):
+        load_robot(None)  # type: ignore[arg-type]

@@ -58,7 +58,7 @@ def test_the_held_share_of_the_planned_squeeze_is_what_creep_leaves_of_it(missin
     for k in range(1, 60):
         laws.feel(force)
         grown = 1.0 - math.exp(-k * PERIOD / ROBOT.gait.period)
-        assert laws.held == pytest.approx(1.0 - missing * grown)
+        assert laws.squeeze_share == pytest.approx(1.0 - missing * grown)
 
 
 @pytest.mark.parametrize(("share", "waits"), [(0.19, True), (0.21, False)])

@@ -9,11 +9,15 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "equations.md"
 OF_PAPER = 5  # equations that the source has
 TAG = re.compile(r"\\tag\{([^}]*)\}")
 CITED = re.compile(r"(paper )?\b[Ee]qs?\. (\d+(?:(?:-|, | and )\d+\b(?!\.\d))*)")
+# equations of one form only: the sweep in O(n), to which models/ is dense, and the complex step
+IN_C_ALONE = {8, 9, 10, 11, 25, 55}
 TEXTS = {".c", ".h", ".py", ".md", ".toml", ".ipynb", ".cpp"}
 
 
@@ -48,6 +52,16 @@ def test_equations_are_numbered_in_the_order_of_the_page() -> None:
 def test_every_displayed_formula_of_the_page_has_a_number() -> None:
     blocks = re.findall(r"```math\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
     assert [block for block in blocks if not TAG.search(block)] == []
+
+
+@pytest.mark.parametrize(("folder", "absent"), [("models", IN_C_ALONE), ("plant_fmu/src", set())])
+def test_each_equation_is_cited_where_it_is_computed(folder: str, absent: set[int]) -> None:
+    texts = [path for path in (ROOT / folder).rglob("*") if path.suffix in {".c", ".h", ".py"}]
+    found: set[int] = set()
+    for path in texts:
+        for _, of_paper, numbers in citations(path.read_text(encoding="utf-8")):
+            found |= set() if of_paper else numbers
+    assert set(page_numbers()) - found == absent
 
 
 def test_every_citation_names_an_equation_that_exists() -> None:

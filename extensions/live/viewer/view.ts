@@ -68,8 +68,8 @@ export class View {
     };
     this.follow(pose);
     const forces = footForces(frame).map((force) => new Vector3(...force));
-    const touching = forces.map((force) => force.length() > 0);
-    this.scene.show(pose, touching, forces, this.place);
+    const contact = forces.map((force) => force.length() > 0);
+    this.scene.show(pose, contact, forces, this.place);
     this.push.show([pose.position], [new Vector3(...frame.push).divideScalar(this.world.weight)]);
     this.eye.lookFrom(this.place, width / height);
     this.renderer.render(this.scene, this.eye.view);

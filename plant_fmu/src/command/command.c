@@ -1,3 +1,5 @@
+/* command.c - commands of servos, a bus' transmissions, setpoints of a firmware, overload, and the
+ * supply's voltage; models/actuator.py and models/servos are the readable form */
 #include "command.h"
 
 #include <math.h>

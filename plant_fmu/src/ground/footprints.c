@@ -1,3 +1,4 @@
+/* footprints.c - the ring of footprints: adds, searches, saves and takes them back */
 #include "footprints.h"
 
 #include <stddef.h>

@@ -1,3 +1,4 @@
+/* soil.c - constants of a soil, and its plastic depth for one foot by the kernels' soil_law.h */
 #include "soil.h"
 
 #include <math.h>

@@ -1,3 +1,5 @@
+/* surface.c - reads a grid's file, and finds the nearest point of its blocks, and of a smooth
+ * surface by the kernels' smooth.h; models/ground is the readable form */
 #include "surface.h"
 
 #include <math.h>

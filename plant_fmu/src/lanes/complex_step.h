@@ -1,5 +1,5 @@
-/* complex_step.h - numbers with derivatives by the complex step, one leg at a time: hxReal is the
- * complex number x + i step x', instead of the pack of lanes.h
+/* complex_step.h - numbers with derivatives by the complex step (eq. 25), one leg at a time: hxReal
+ * is the complex number x + i step x', instead of the pack of lanes.h
  *
  * (a + i h a')(b + i h b') = ab + i h (a b' + a' b) - h^2 a' b', and the last term vanishes at h =
  * 1e-170. Derivatives are therefore exact to rounding; no difference of values is taken.

@@ -33,8 +33,8 @@ static inline hxReal drive_acceleration(const hxModel *model, const hxCommand *c
   return acceleration_ref - 2.0 * model->alpha * slower - model->beta * model->beta * error;
 }
 
-/* Returns dw of eq. 9: rows 4 and 5 of D dw are c = gamma - 2 alpha dPhi - beta^2 Phi, and s.dw is
- * 0 or the drive's qdd. Without x = w_i x w_j, gamma is Phi |w|^2 - w qd of the relative angular
+/* Returns dw of eq. 9: rows 4 and 5 of D dw are c (eq. 7), and s.dw is 0 or the drive's qdd.
+ * Without x = w_i x w_j, gamma (eq. 3) is Phi |w|^2 - w qd of the relative angular
  * velocity w_ij_j; the rest is solved in the child's axes. */
 static inline hxVec3 joint_bias(const hxModel *model, const hxJointKinematics *kin, hxVec3 w_i,
                                 const hxBody *j, hxReal speed, hxReal driven) {

@@ -309,7 +309,7 @@ static void fill_constraint(const hxModel *model, const hxPlantMotion *motion, h
   o->constraint.velocity_error = hx_lane(hx_sqrt(hx_sum_legs(velocity)), 0);
 }
 
-/* Fills the energies and the audit's error. */
+/* Fills the energies and the audit's error (eq. 26). */
 static void fill_energy(const hxModel *model, const hxState *state, const hxWork *work,
                         hxOutput *o) {
   const hxPlantMotion *m = &state->motion;

@@ -1,5 +1,5 @@
 /* foot_measure.h - measurements of a foot along a step: slip, impulse and peaks (eq. 28), loading
- * rate of a landing (eq. 29), use of the friction cone */
+ * rate of a landing (eq. 29), use of the friction cone (eq. 30) */
 #ifndef HX_FOOT_MEASURE_H
 #define HX_FOOT_MEASURE_H
 
@@ -249,7 +249,7 @@ HX_INLINE hxReal cone(const hxPath *path, int row, int slot, hxReal along) {
 }
 
 /* Adds the step to the time of a row of feet under load, by the share of the cone that its
- * impulses use. */
+ * impulses use (eq. 30). */
 static inline void measure_cone(const hxPath *path, int row, const hxImpulses *impulse,
                                 hxMeasured *measured) {
   const hxContactMoment *from = &path->from->contact[row], *to = &path->to->contact[row];

@@ -1,3 +1,4 @@
+/* advance.c - hx_plant_step: a call in parts, from one transmission of the bus to the next */
 #include <math.h>
 #include <string.h>
 

@@ -1,3 +1,4 @@
+/* continuous.c - coordinates, rates and indicators for a solver in model exchange */
 #include <math.h>
 #include <string.h>
 

@@ -1,3 +1,4 @@
+/* derivative.c - directional derivatives of rates and outputs, by tangent.c */
 #include <math.h>
 #include <string.h>
 

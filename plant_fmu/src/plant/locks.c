@@ -1,3 +1,4 @@
+/* locks.c - faults that hold a joint where it is: stops that close at its angle */
 #include <math.h>
 #include <string.h>
 

@@ -1,3 +1,4 @@
+/* saved_state.c - a plant's model and state as bytes with a checksum, for FMI's saved states */
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>

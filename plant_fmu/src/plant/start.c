@@ -1,3 +1,4 @@
+/* start.c - checks of a definition's terrain and of the start: no contact may begin deep in it */
 #include <math.h>
 
 #include "../contact_law.h"

@@ -1,3 +1,4 @@
+/* tune.c - changes tunable parameters between steps, and counts the work that this takes */
 #include <string.h>
 
 #include "../contact_law.h"

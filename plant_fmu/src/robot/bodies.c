@@ -1,3 +1,5 @@
+/* bodies.c - states of all bodies from the joints' angles, and from and to the plant's motion;
+ * models/kinematics.py is the readable form */
 #include <string.h>
 
 #include "../elementary.h"

@@ -1,3 +1,5 @@
+/* frames.c - vectors, quaternions and the frames of joints, while a definition is compiled;
+ * models/kinematics.py is the readable form */
 #include "robot.h"
 
 #include <math.h>

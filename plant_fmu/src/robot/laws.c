@@ -1,3 +1,4 @@
+/* laws.c - compiles the constants of friction, soil, servo, gear and stops */
 #include "robot.h"
 
 #include <math.h>

@@ -1,3 +1,4 @@
+/* robot.c - compiles a definition into a model: joints, inertias, points and rows of contacts */
 #include "robot.h"
 
 #include "../contact_law.h"

@@ -1,3 +1,4 @@
+/* validation.c - checks of a definition and of an input, beyond the ranges of their numbers */
 #include "robot.h"
 
 #include <math.h>

@@ -256,7 +256,7 @@ static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegS
   const double needed = hx_force_laws_needed(&model->laws, laws);
   hx_load_adaptation_weigh(&model->adaptation, hx_force_laws_heft(laws), &compliant->adaptation);
   hx_load_adaptation_step(&model->adaptation, (const double (*)[HX_JOINTS])laws->torque, needed,
-                          laws->held, &compliant->adaptation);
+                          laws->squeeze_share, &compliant->adaptation);
 }
 
 #endif

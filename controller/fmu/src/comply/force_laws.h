@@ -43,7 +43,7 @@ typedef struct hxForceLaws {
   int regaining;        /* some grip may be below 1 */
   double scale;         /* 1    measured over planned weight */
   hxPlane lean;         /* m, of the measured centre of mass from the modelled one, walking frame */
-  double held;          /* 1, share of the planned squeeze that the ground holds, smoothed */
+  double squeeze_share; /* 1, of the planned squeeze, that the ground holds, smoothed */
   /* scale, heft and lean before a sensor contradicted the plan */
   double sure_scale, sure_heft;
   hxPlane sure_lean;
@@ -101,7 +101,7 @@ static inline void hx_force_laws_compile(const hxControllerDefinition *definitio
 
 static inline void hx_force_laws_reset(hxForceLaws *laws) {
   memset(laws, 0, sizeof *laws);
-  laws->trust.level = laws->held = laws->sure_scale = laws->sure_heft = 1.0;
+  laws->trust.level = laws->squeeze_share = laws->sure_scale = laws->sure_heft = 1.0;
   hx_landings_reset(&laws->landings);
   hx_burden_reset(&laws->burden);
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->grip[leg] = 1.0;
@@ -254,7 +254,7 @@ static inline double feel(const hxForceLawsModel *model, const hxLoadPlan *plan,
   for (int leg = 0; leg < HX_LEGS; ++leg)
     laws->load[leg] += model->follow_load * (normal[leg] / model->share - laws->load[leg]);
   const double missing = squeeze_lost(plan, (const hxPlane *)deviation, laws);
-  laws->held += model->follow_cycle * (1.0 - missing - laws->held);
+  laws->squeeze_share += model->follow_cycle * (1.0 - missing - laws->squeeze_share);
   return total;
 }
 

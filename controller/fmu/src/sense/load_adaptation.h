@@ -72,10 +72,10 @@ static inline double hx_load_adaptation_laden(const hxLoadAdaptation *adaptation
 
 /* Advances by one period, after hx_load_adaptation_weigh (C45). torque: feed-forward torques [N m];
  * needed: largest torque that the measured weight needs, over the largest that is allowed [1];
- * held: share of the planned squeeze that the ground holds [1]. */
+ * squeeze_share: of the planned squeeze, that the ground holds [1]. */
 static inline void hx_load_adaptation_step(const hxLoadAdaptationModel *model,
                                            const double torque[HX_LEGS][HX_JOINTS], double needed,
-                                           double held, hxLoadAdaptation *adaptation) {
+                                           double squeeze_share, hxLoadAdaptation *adaptation) {
   double hottest = 0.0, hardest = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
@@ -89,7 +89,7 @@ static inline void hx_load_adaptation_step(const hxLoadAdaptationModel *model,
   const double warm = hx_larger((hottest / model->rating - cool) / (hot - cool),
                                 (hardest / model->rating - over) / (far_over - over)),
                part = hx_larger(warm, hx_larger((needed - easy) / (hard - easy),
-                                                (held - creeps) / (holds - creeps) *
+                                                (squeeze_share - creeps) / (holds - creeps) *
                                                     (1.0 - adaptation->narrowing)));
   const double least = model->squeeze * (1.0 - spared * adaptation->narrowing),
                more = least > 0.0 ? hx_larger(most_squeeze - least, 0.0) : 0.0;

@@ -254,7 +254,7 @@ typedef struct hxControllerOutput {
   double acceleration_ref[6][3];
   /* 0 or 1  The leg is out of service: it is folded away, and the others walk without it */
   int absent[6];
-  /* 0 or 1  The servo does not do what it is told: it is limp or locked, or its angle sensor is
+  /* 0 or 1  The servo does not follow its command: it is limp or locked, or its angle sensor is
    * wrong */
   int faulty[6][3];
   /* 0 or 1  The commanded velocity is too fast for the leg's joints: the body walks at the share of
