@@ -81,7 +81,7 @@ def main() -> None:
     tools.missing.update({one: bench.errors[one] for one in bench.errors if one not in worked})
     facts = json.dumps(described(tools), indent=2)
     (folder / "machine.json").write_text(f"{facts}\n", encoding="utf-8")
-    _write_walks(folder, runs, series, tools)
+    _write_walks(folder, runs, series)
     parts, scaling = measured_parts(bench, series, runs, walks, quick=quick)
     table = rows(runs, series, parts)
     _write_csv(folder / "table.csv", [asdict(row) | {"met": row.met} for row in table])
@@ -157,7 +157,7 @@ def measured_parts(
     return parts, scaling
 
 
-def _write_walks(folder: Path, runs: Sequence[Run], series: Sequence[Series], tools: Tools) -> None:
+def _write_walks(folder: Path, runs: Sequence[Run], series: Sequence[Series]) -> None:
     _write_csv(
         folder / "walks.csv",
         [asdict(run) | {"realtime_factor": run.realtime_factor} for run in runs],

@@ -146,7 +146,7 @@ def unknown_name(
     """
     names = list(valid)
     near = nearest_name(name, names)
-    fix = f"did you mean {near!r}?" if near else f"choose one of the {len(names)} valid names"
+    fix = f"did you mean {near!r}?" if near else "write one of these names"
     return error(
         f"unknown {kind}", got=name, expected=f"one of {', '.join(names)}", fix=fix, where=where
     )

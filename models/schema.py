@@ -172,7 +172,7 @@ class Whole:
     def read(self, value: Any, where: str) -> int:
         """Returns the value. Raises RobotError; `where` names the key."""
         if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-            raise wrong_type(value, self.expected, "write 1", where)
+            raise wrong_type(value, self.expected, "write 1 or another whole number", where)
         return value
 
 

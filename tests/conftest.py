@@ -57,7 +57,6 @@ LONGEST = (
     "test_identify",
     "test_export",
     "test_fmi3_archive",
-    "test_control_benchmark",
     "test_plant_lanes",
 )
 # what builds the same binaries for other platforms stays together

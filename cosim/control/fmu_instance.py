@@ -88,7 +88,6 @@ class ControllerFmu3:
     def __init__(self, path: Path, description: Any) -> None:
         self.path = path
         self.variables = {variable.name: variable for variable in description.modelVariables}
-        self._event_mode = bool(getattr(description.coSimulation, "hasEventMode", False))
         self._messages: list[str] = []
         self._initialised = False
         self._directory = TemporaryFolder("fmu")

@@ -27,7 +27,7 @@ from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError, nearest_name
 from hexapod_cosim.models.files import decoding_toml, parse_toml, read_text
 
 MOST_SHOWN = 12  # names in a message
-# sources of inputs, in the order of the vector that source_vector() fills
+# sources of inputs, in the order of the vector that source_row() fills
 SOURCES = [*COMMANDS, *READINGS]
 SINKS = [*JOINT_COMMANDS, *ACCELERATION]  # of outputs: the plant's inputs
 FAULTY = [f"{joint}.faulty" for joint in JOINT_NAMES]

@@ -55,6 +55,7 @@ from hexapod_cosim.cosim.cli import main
         ),
         (["export", "-o", "."], ["got '.'", "ends in .fmu", "write -o athena.fmu"]),
         (["export", "--fmi", "7"], ["FMI version", "got 7"]),
+        (["simulate", "--format", "hdf5"], ["--format: unknown format", "got 'hdf5'", "parquet"]),
         (["export", "--platforms", "amiga"], ["amiga"]),
         (["list", "robot"], ["'robot'", "did you mean 'robots'"]),
         (["compare", "--seeds", "x"], ["Invalid value 'x' for '--seeds'", "compare --help"]),
