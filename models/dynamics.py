@@ -58,11 +58,11 @@ def masses(robot: Robot) -> Array:
 
 
 def world_inertias(robot: Robot, body: Array) -> Array:
-    """Returns the inertias J = R J_B R^T (19, 3, 3), world axes [kg m2]."""
+    """Returns the inertias J = R_WB J_B R_WB^T (19, 3, 3), world axes [kg m2]."""
     local = [robot.torso.inertia, *(link.inertia for leg in robot.legs for link in leg.links)]
     turns = [rotation_matrix(state[3:7]) for state in body]
     return np.array(
-        [R @ inertia_matrix(entries) @ R.T for R, entries in zip(turns, local, strict=True)]
+        [R_WB @ inertia_matrix(J_B) @ R_WB.T for R_WB, J_B in zip(turns, local, strict=True)]
     )
 
 

@@ -1,7 +1,6 @@
 """Computes rotations, body states from joint angles, and joint angles from body states.
 
-Letters of frames (docs/architecture.md): R_WB converts components in B to components in W. World W,
-torso T, hip H, parent link P, link L, centre of mass c.
+docs/architecture.md has the letters of the frames: R_WB turns components in B into those in W.
 """
 
 from __future__ import annotations

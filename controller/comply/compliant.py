@@ -44,15 +44,15 @@ def sense(measurement: Measurement, posture: Posture) -> Array:
     """Returns the foot forces (6, 3) in the walking frame [N]: f_K = R_KT R_TW f_W (C22)."""
     w, x, y, z = measurement.quaternion.tolist()
     xx, yy, zz = x * x, y * y, z * z
-    rotation = np.array(
+    R_WT = np.array(
         [
             [1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
             [2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)],
             [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)],
         ]
-    )  # R_WT
-    force = measurement.foot_force @ rotation
-    return force if posture.level else np.asarray(force @ posture.rotation.T)
+    )
+    force = measurement.foot_force @ R_WT
+    return force if posture.level else np.asarray(force @ posture.R_KT.T)
 
 
 class PresentStep(NamedTuple):

@@ -20,7 +20,7 @@ class Posture(NamedTuple):
 
     level: bool  # height, roll, pitch and their rates are all 0: the frames coincide
     height: float  # m
-    rotation: Array  # 1    (3, 3) R_KT
+    R_KT: Array  # 1    (3, 3)
     rate: float  # m/s    of the height
     spin: tuple[float, float, float]  # rad/s    w_KT, torso axes
 
@@ -35,17 +35,17 @@ class Posture(NamedTuple):
         if not any((height, roll, pitch, height_rate, roll_rate, pitch_rate)):
             return LEVEL
         cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-        rotation = np.array([[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]])
+        R_KT = np.array([[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]])
         spin = (roll_rate, pitch_rate * cr, -pitch_rate * sr)
-        return cls(False, height, rotation, height_rate, spin)
+        return cls(False, height, R_KT, height_rate, spin)
 
     def turn(self, plane: Any, z: Any) -> tuple[Any, Any]:
         """Returns R_KT p of vectors p = (x + i y, z) of any shape: torso axes to walking axes."""
-        return (plane, z) if self.level else _product(self.rotation, plane, z)
+        return (plane, z) if self.level else _product(self.R_KT, plane, z)
 
     def turn_back(self, plane: Any, z: Any) -> tuple[Any, Any]:
         """Returns R_TK p of vectors p = (x + i y, z) of any shape: walking axes to torso axes."""
-        return (plane, z) if self.level else _product(self.rotation.T, plane, z)
+        return (plane, z) if self.level else _product(self.R_KT.T, plane, z)
 
     def to_torso(self, plane: Any, height: Any) -> tuple[Any, Any]:
         """Converts points (x + i y, z) [m] from the walking frame to the torso frame."""
@@ -58,7 +58,7 @@ class Posture(NamedTuple):
             return feet
         x, y, z = self.spin
         plane, height = self.to_torso(feet.plane, feet.height)
-        # v_T = R_TK (v_K - rate e_z) - w_T x p_T
+        # v_T = R_TK (v_K - rate e_z) - w_KT x p_T
         velocity, rise = self.turn_back(feet.velocity, feet.rise - self.rate)
         velocity = velocity - ((y - 1j * x) * height + 1j * z * plane)
         rise = rise - (x * plane.imag - y * plane.real)

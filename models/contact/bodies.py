@@ -113,11 +113,11 @@ def leg_points(robot: Robot, body: Array) -> Array:
     points = np.zeros((LEGS, 3, 3))
     for leg, data in enumerate(robot.legs):
         femur, tibia = body[JOINTS * leg + 2], body[JOINTS * leg + 3]
-        R_WF, R_WT = rotation_matrix(femur[3:7]), rotation_matrix(tibia[3:7])
+        R_WF, R_WS = rotation_matrix(femur[3:7]), rotation_matrix(tibia[3:7])
         com = np.array(data.links[2].com)
         points[leg, 0] = femur[0:3] - R_WF @ np.array(data.links[1].com)
-        points[leg, 1] = tibia[0:3] - R_WT @ com
-        points[leg, 2] = tibia[0:3] + R_WT @ (np.array(data.links[2].tip) - com)
+        points[leg, 1] = tibia[0:3] - R_WS @ com
+        points[leg, 2] = tibia[0:3] + R_WS @ (np.array(data.links[2].tip) - com)
     return points
 
 

@@ -214,7 +214,7 @@ def test_the_torso_rolls_about_x_first_and_then_pitches_about_y(roll: float, pit
     expected = axis_rotation(np.array([0.0, 1.0, 0.0]), pitch) @ axis_rotation(
         np.array([1.0, 0.0, 0.0]), roll
     )
-    np.testing.assert_allclose(leaning(roll, pitch).rotation, expected, atol=POSTURE_ROUND_OFF)
+    np.testing.assert_allclose(leaning(roll, pitch).R_KT, expected, atol=POSTURE_ROUND_OFF)
 
 
 def test_positive_roll_lowers_the_right_side_and_positive_pitch_the_nose() -> None:

@@ -68,13 +68,13 @@ static inline hxReal hx_line_distance(hxVec3 p, hxVec3 a, hxVec3 q, hxVec3 b) {
 
 /* Stores the points of a pack of legs, world axes. */
 static inline void leg_chain(const hxModel *model, const hxPlantMotion *motion, int slot,
-                             hxMat3 R_WF, hxMat3 R_WT, hxNumber chain[HX_CHAIN][3][HX_SLOTS]) {
+                             hxMat3 R_WF, hxMat3 R_WS, hxNumber chain[HX_CHAIN][3][HX_SLOTS]) {
   const hxVec3 femur = hx_link_vec3(motion, 1, HX_R, slot),
                tibia = hx_link_vec3(motion, 2, HX_R, slot);
   const hxVec3 point[HX_CHAIN] = {
       hx_add3(femur, hx_mul(R_WF, hx_load_vec3(model->joint[1].point_j, slot))),
-      hx_add3(tibia, hx_mul(R_WT, hx_load_vec3(model->point[HX_KNEE], slot))),
-      hx_add3(tibia, hx_mul(R_WT, hx_load_vec3(model->point[HX_FOOT], slot)))};
+      hx_add3(tibia, hx_mul(R_WS, hx_load_vec3(model->point[HX_KNEE], slot))),
+      hx_add3(tibia, hx_mul(R_WS, hx_load_vec3(model->point[HX_FOOT], slot)))};
   for (int k = 0; k < HX_CHAIN; ++k) hx_store_vec3(chain[k], slot, point[k]);
 }
 

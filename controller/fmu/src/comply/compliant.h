@@ -62,15 +62,13 @@ static inline void hx_sense(const hxControllerInput *input, const hxPosture *pos
   const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
                z = input->quaternion[3];
   const double xx = x * x, yy = y * y, zz = z * z;
-  const double rotation[3][3] = {
-      {1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
-      {2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)},
-      {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)}};
+  const double R_WT[3][3] = {{1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
+                             {2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)},
+                             {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)}};
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double *f = input->foot_force[leg];
     double seen[3];
-    for (int i = 0; i < 3; ++i)
-      seen[i] = f[0] * rotation[0][i] + f[1] * rotation[1][i] + f[2] * rotation[2][i];
+    for (int i = 0; i < 3; ++i) seen[i] = f[0] * R_WT[0][i] + f[1] * R_WT[1][i] + f[2] * R_WT[2][i];
     hxPlane plane = {seen[0], seen[1]};
     hx_posture_turn(posture, &plane, &seen[2]);
     force[leg][0] = plane.x;

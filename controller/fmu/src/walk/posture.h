@@ -7,11 +7,11 @@
 
 /* The torso in the walking frame. */
 typedef struct hxPosture {
-  int level;             /* height, roll, pitch and their rates are all 0: nothing to turn */
-  double height;         /* m */
-  double rotation[3][3]; /* 1      R_KT */
-  double rate;           /* m/s    of the height */
-  double spin[3];        /* rad/s  w_KT, torso axes */
+  int level;         /* height, roll, pitch and their rates are all 0: nothing to turn */
+  double height;     /* m */
+  double R_KT[3][3]; /* 1 */
+  double rate;       /* m/s    of the height */
+  double spin[3];    /* rad/s  w_KT, torso axes */
 } hxPosture;
 
 /* Sets the torso's posture: first roll about x, then pitch about y [m, rad, per second]. */
@@ -19,9 +19,9 @@ static inline void hx_posture_of(hxPosture *posture, const double value[3], cons
   double cr, sr, cp, sp;
   hx_sine_cosine(value[1], &sr, &cr);
   hx_sine_cosine(value[2], &sp, &cp);
-  const double rotation[3][3] = {{cp, sp * sr, sp * cr}, {0.0, cr, -sr}, {-sp, cp * sr, cp * cr}};
+  const double R_KT[3][3] = {{cp, sp * sr, sp * cr}, {0.0, cr, -sr}, {-sp, cp * sr, cp * cr}};
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) posture->rotation[i][j] = rotation[i][j];
+    for (int j = 0; j < 3; ++j) posture->R_KT[i][j] = R_KT[i][j];
   posture->level = 1;
   for (int i = 0; i < 3; ++i) posture->level &= value[i] == 0.0 && rate[i] == 0.0;
   posture->height = value[0];
@@ -33,23 +33,21 @@ static inline void hx_posture_of(hxPosture *posture, const double value[3], cons
 
 /* Compute R_KT p and R_TK p of p = (plane, z), in place. */
 static inline void hx_posture_turn(const hxPosture *posture, hxPlane *plane, double *z) {
-  const double (*rotation)[3] = posture->rotation;
+  const double (*R_KT)[3] = posture->R_KT;
   const double p[3] = {plane->x, plane->y, *z};
   double q[3];
   if (posture->level) return;
-  for (int i = 0; i < 3; ++i)
-    q[i] = rotation[i][0] * p[0] + rotation[i][1] * p[1] + rotation[i][2] * p[2];
+  for (int i = 0; i < 3; ++i) q[i] = R_KT[i][0] * p[0] + R_KT[i][1] * p[1] + R_KT[i][2] * p[2];
   *plane = hx_plane(q[0], q[1]);
   *z = q[2];
 }
 
 static inline void hx_posture_turn_back(const hxPosture *posture, hxPlane *plane, double *z) {
-  const double (*rotation)[3] = posture->rotation;
+  const double (*R_KT)[3] = posture->R_KT;
   const double p[3] = {plane->x, plane->y, *z};
   double q[3];
   if (posture->level) return;
-  for (int i = 0; i < 3; ++i)
-    q[i] = rotation[0][i] * p[0] + rotation[1][i] * p[1] + rotation[2][i] * p[2];
+  for (int i = 0; i < 3; ++i) q[i] = R_KT[0][i] * p[0] + R_KT[1][i] * p[1] + R_KT[2][i] * p[2];
   *plane = hx_plane(q[0], q[1]);
   *z = q[2];
 }
@@ -67,7 +65,7 @@ static inline void hx_posture_feet_to_torso(const hxPosture *posture, hxPlane *p
   const double *w = posture->spin;
   if (posture->level) return;
   hx_posture_to_torso(posture, plane, height);
-  /* v_T = R_TK (v_K - rate e_z) - w_T x p_T */
+  /* v_T = R_TK (v_K - rate e_z) - w_KT x p_T */
   *rise -= posture->rate;
   hx_posture_turn_back(posture, velocity, rise);
   velocity->x -= w[1] * *height - w[2] * plane->y;
