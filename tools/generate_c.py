@@ -141,23 +141,14 @@ def render_variables(interface: Interface, guid: str) -> str:
             lines += [f"static const hxVariable {causality}s[] = {{", *rows, "};", ""]
     lines += ["const hxSection hx_sections[HX_CAUSALITIES] = {"]
     for causality in CAUSALITIES:
-        first, any_variables = (
-            interface.first_reference[causality],
-            interface.of_causality(causality),
-        )
-        row = (
-            f"{first}, sizeof {causality}s / sizeof {causality}s[0], {causality}s"
-            if any_variables
-            else f"{first}, 0, 0"
-        )
+        first, rows = interface.first_reference[causality], f"{causality}s"
+        table = f"sizeof {rows} / sizeof {rows}[0], {rows}"
+        row = f"{first}, {table if interface.of_causality(causality) else '0, 0'}"
         lines += [f"    [HX_{causality.upper()}] = {{{row}}},"]
     lines += ["};", "", "const unsigned char hx_output_groups[] = {"]
     lines += [f"    {_groups(output)}," for output in interface.of_causality("output")]
-    lines += [
-        "};",
-        "",
-        f"const unsigned hx_time_reference = {interface.first_reference['independent']};",
-    ]
+    time = interface.first_reference["independent"]
+    lines += ["};", "", f"const unsigned hx_time_reference = {time};"]
     lines += ["", "const char *const hx_log_category_names[] = {"]
     lines += [f'    "{name}",' for name in interface.log_categories]
     lines += ["};", "", *_states(interface)]
@@ -171,12 +162,8 @@ def _states(interface: Interface) -> list[str]:
         return ["const hxStateRow *const hx_states = 0;", "const size_t hx_state_count = 0;", ""]
     variables = [interface.variable(state.name) for state in interface.states]
     rows = [f"    {{{variable.reference}, {variable.nominal!r}}}," for variable in variables]
-    lines = [
-        "static const hxStateRow states[] = {",
-        *rows,
-        "};",
-        "const hxStateRow *const hx_states = states;",
-    ]
+    lines = ["static const hxStateRow states[] = {", *rows, "};"]
+    lines += ["const hxStateRow *const hx_states = states;"]
     lines += ["const size_t hx_state_count = sizeof states / sizeof states[0];", ""]
     lines.append(
         "_Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / "
@@ -230,16 +217,10 @@ def render_defaults(interface: Interface) -> str:
     lines += ["const char *hx_version(void) {", f'  return "{interface.version}";', "}", ""]
     for member in ("definition", "input"):
         structure = f"hx{component.structure}{member.capitalize()}"
-        lines += [
-            f"static const hxRange {member}_ranges[] = {{",
-            *_ranges(interface, member, structure),
-            "};",
-            "",
-        ]
-        lines += [
-            f"size_t hx_{component.prefix}{member}_ranges(const hxRange **range) {{",
-            f"  *range = {member}_ranges;",
-        ]
+        ranges = _ranges(interface, member, structure)
+        lines += [f"static const hxRange {member}_ranges[] = {{", *ranges, "};", ""]
+        lines += [f"size_t hx_{component.prefix}{member}_ranges(const hxRange **range) {{"]
+        lines += [f"  *range = {member}_ranges;"]
         lines += [f"  return sizeof {member}_ranges / sizeof {member}_ranges[0];", "}", ""]
     return "\n".join(lines)
 
@@ -248,18 +229,11 @@ def _default(interface: Interface, member: str) -> Iterable[str]:
     """Yields a structure's default values and the function that copies them."""
     structure = f"hx{interface.component.structure}{member.capitalize()}"
     function = f"hx_{interface.component.prefix}{member}_default"
-    yield from (
-        f"static const {structure} default_{member} = {{",
-        *_initialisers(interface, member),
-        "};",
-        "",
-    )
-    yield from (
-        f"void {function}({structure} *{member}) {{",
-        f"  *{member} = default_{member};",
-        "}",
-        "",
-    )
+    yield f"static const {structure} default_{member} = {{"
+    yield from _initialisers(interface, member)
+    yield from ("};", "")
+    yield f"void {function}({structure} *{member}) {{"
+    yield from (f"  *{member} = default_{member};", "}", "")
 
 
 def _ranges(interface: Interface, member: str, structure: str) -> Iterable[str]:

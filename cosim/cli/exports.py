@@ -20,18 +20,9 @@ from hexapod_cosim.models import HexapodError, Robot, load_robot, unknown_name
 from hexapod_cosim.models.mjcf import robot_to_mjcf
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
-
-@dataclass(frozen=True)
-class Format:
-    """A file format of robots."""
-
-    suffix: str
-    write: Callable[[Robot], str]
-
-
-FORMATS = {"urdf": Format(".urdf", robot_to_urdf), "mjcf": Format(".xml", robot_to_mjcf)}
+FORMATS: dict[str, Callable[[Robot], str]] = {"urdf": robot_to_urdf, "mjcf": robot_to_mjcf}
+SUFFIXES = {"urdf": ".urdf", "mjcf": ".xml", "ssp": ".ssp"}  # of what is no FMU
 DEFAULT_CONTROL = "compliant"  # of a package
-SUFFIXES = {**{name: form.suffix for name, form in FORMATS.items()}, "ssp": ".ssp"}
 CONTROLLER_OPTIONS = ("gait", "gains", "period")
 DESCRIPTION, PLANT_FMU = "a robot's description", "the plant's FMU"
 CONTROLLER_FMU, PACKAGE = "a controller's FMU", "a package"
@@ -76,14 +67,14 @@ def write_export(request: Request, *, as_json: bool) -> None:
         written = DESCRIPTION
     _refuse_unused_options(request.context, written)
     robot, gait = _in_stance(robot, request.stance)
-    if kind in FORMATS:
-        path = _export_description(robot, request.output, FORMATS[kind])
-    elif control is None:
-        path = _export_plant(robot, request)
+    name = f"{robot.name}_controller" if written == CONTROLLER_FMU else robot.name
+    path = _path(request.output, name, SUFFIXES.get(kind, ".fmu"))
+    if written == DESCRIPTION:
+        export_description(robot, path, FORMATS[kind])
     else:
-        setup = _controller_setup(robot, request, control, gait)
-        export = _export_package if kind == "ssp" else _export_controller
-        path = export(setup, request)
+        setup = None if control is None else _controller_setup(robot, request, control, gait)
+        with waiting("compiling" if request.platforms else None):
+            _export_fmu(robot, setup, request, path)
     if as_json:
         show_json({kind: str(path), "robot": robot.name, "hash": robot.hash})
         return
@@ -141,44 +132,17 @@ def _in_stance(robot: Robot, stance: str) -> tuple[Robot, Gait | None]:
     return walk.robot, walk.gait
 
 
-def _export_description(robot: Robot, output: Path | None, form: Format) -> Path:
-    """Writes a robot's URDF or MJCF file and returns its path."""
-    return export_description(robot, _path(output, robot.name, form.suffix), form)
-
-
-def _export_plant(robot: Robot, request: Request) -> Path:
-    """Writes the plant's FMU and returns its path."""
-    with waiting("compiling" if request.platforms else None):
-        return export_fmu(
-            robot,
-            _path(request.output, robot.name, ".fmu"),
-            fmi=request.fmi,
-            platforms=request.platforms,
-            terrains=surfaces_from(request.terrains),
-        )
-
-
-def _export_controller(setup: ControllerSetup, request: Request) -> Path:
-    """Writes the controller's FMU and returns its path."""
-    with waiting("compiling" if request.platforms else None):
-        return export_controller(
-            setup,
-            _path(request.output, f"{setup.robot.name}_controller", ".fmu"),
-            fmi=request.fmi,
-            platforms=request.platforms,
-        )
-
-
-def _export_package(setup: ControllerSetup, request: Request) -> Path:
-    """Writes plant and controller as an SSP package and returns its path."""
-    with waiting("compiling" if request.platforms else None):
-        return export_package(
-            setup,
-            _path(request.output, setup.robot.name, ".ssp"),
-            values=read_values(request.values),
-            platforms=request.platforms,
-            fmi=request.fmi,
-        )
+def _export_fmu(robot: Robot, setup: ControllerSetup | None, request: Request, path: Path) -> None:
+    """Writes the plant's FMU, or with a setup the controller's or a package of both."""
+    fmi, platforms = request.fmi, request.platforms
+    if setup is None:
+        terrains = surfaces_from(request.terrains)
+        export_fmu(robot, path, fmi=fmi, platforms=platforms, terrains=terrains)
+    elif path.suffix == SUFFIXES["ssp"]:
+        values = read_values(request.values)
+        export_package(setup, path, values=values, platforms=platforms, fmi=fmi)
+    else:
+        export_controller(setup, path, fmi=fmi, platforms=platforms)
 
 
 def _path(output: Path | None, name: str, suffix: str) -> Path:
@@ -212,12 +176,11 @@ def _controller_setup(
     return setup
 
 
-def export_description(robot: Robot, path: str | Path, form: Format) -> Path:
+def export_description(robot: Robot, path: Path, render: Callable[[Robot], str]) -> Path:
     """Writes a robot's file atomically and returns its path.
 
     Raises HexapodError when the file cannot be written.
     """
-    path, text = Path(path), form.write(robot)
     with writing_into(path.parent):
-        write_text(path, text)
+        write_text(path, render(robot))
     return path
