@@ -26,9 +26,10 @@ typedef double _Complex hxComplex;
 #define HX_TANGENT
 #define HX_LANES 1
 
-#include "kernels/output.h"
 #include "lanes/coordinates.h"
 #include "lanes/dynamics.h"
+
+#include "kernels/output.h"
 
 /* A point consists of numbers, the model's integer choices, and numbers; an output consists of
  * numbers, contact flags, and numbers. */
