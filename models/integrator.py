@@ -1,6 +1,6 @@
 """Integrates the motion with error control and ends a step at every touch-down.
 
-This is the readable form of integrator.h in plant_fmu/src/lanes, with the same names, on every
+This is the readable form of integrator.h in plant_fmu/src/kernels, with the same names, on every
 ground: planes, surfaces, blocks and soil, with contacts of feet, torso, knees and shanks. It
 omits the measurements of a step (models/measure.py), commands that change within a step, and calls
 that an event interrupts.

@@ -1,6 +1,6 @@
 """Computes one step of a method from a start, and its error (eq. 19-22).
 
-This is the readable form of step.h in plant_fmu/src/lanes, with the same names.
+This is the readable form of step.h in plant_fmu/src/kernels, with the same names.
 """
 
 from __future__ import annotations

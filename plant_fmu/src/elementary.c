@@ -1,12 +1,10 @@
-/* elementary.c - series for sine, cosine and logarithm; the power is that of ground/power.h */
+/* elementary.c - series for sine, cosine and logarithm; the power is that of packs/power.h */
 #include "elementary.h"
 
 #include <math.h>
 
 #define HX_LANES 1
-#include "lanes/lanes.h"
-
-#include "ground/power.h" /* behind the numbers that it computes with */
+#include "packs/power.h"
 
 /* 1 - z/(n(n+1)) (1 - z/((n+2)(n+3)) (1 - ...)): sin(r)/r from n = 2, cos(r) from n = 1, z = r^2;
  * nine terms for |r| <= pi/4 */

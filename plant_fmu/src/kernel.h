@@ -1,8 +1,8 @@
 /* kernel.h - table of functions of the physics for one instruction set, and the list of such
  * kernels
  *
- * Each kernel_*.c compiles lanes/entry_points.h and what it includes at its own width. All kernels
- * give the same bits (lanes/lanes.h), so a state saved by one can be continued by another.
+ * Each kernel_*.c compiles entry_points.h and what it includes at its own width. All kernels
+ * give the same bits (packs/lanes.h), so a state saved by one can be continued by another.
  */
 #ifndef HX_KERNEL_H
 #define HX_KERNEL_H

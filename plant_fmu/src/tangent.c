@@ -28,7 +28,8 @@ typedef double _Complex hxComplex;
 
 #include "lanes/coordinates.h"
 #include "lanes/dynamics.h"
-#include "lanes/output.h"
+
+#include "kernels/output.h"
 
 /* A point consists of numbers, the model's integer choices, and numbers; an output consists of
  * numbers, contact flags, and numbers. */

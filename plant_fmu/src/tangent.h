@@ -1,5 +1,5 @@
 /* tangent.h - directional derivatives of rates and outputs, by the complex step
- * (lanes/complex_step.h) */
+ * (packs/complex_step.h) */
 #ifndef HX_TANGENT_H
 #define HX_TANGENT_H
 

@@ -44,6 +44,17 @@ CONTROL_ROOMS = {
     "comply": ["walk", "sense"],
     "design": ["walk", "sense", "comply"],
 }
+# what each folder of plant_fmu/src may include, besides the files beside the folders
+PLANT_FOLDERS: dict[str, list[str]] = {
+    "packs": [],
+    "ground": ["packs"],
+    "lanes": ["packs", "ground"],
+    "measure": ["packs", "ground", "lanes"],
+    "kernels": ["packs", "ground", "lanes", "measure"],
+    "command": [],
+    "robot": ["ground"],
+    "plant": ["ground", "command", "robot"],
+}
 # the components of FMUs; an extension may have been deleted
 POLICY = "extensions/gym/policy_fmu"
 COMPONENTS = ("plant_fmu", "controller/fmu", *([POLICY] if (ROOT / POLICY).is_dir() else []))
@@ -111,6 +122,21 @@ def test_a_room_imports_only_the_rooms_below_it(folder: str, rooms: dict[str, li
                     f"{path.relative_to(ROOT)} imports {name}"
                 )
     assert seen == set(rooms)
+
+
+def test_a_folder_of_the_plant_includes_only_the_folders_below_it() -> None:
+    source, seen = ROOT / "plant_fmu" / "src", set()
+    for path in sorted(source.glob("*/*.[ch]")):
+        folder = path.parent.name
+        seen.add(folder)
+        for name in INCLUDE.findall(path.read_text(encoding="utf-8")):
+            beside = (path.parent / name).resolve()
+            other = beside.parent.name if beside.is_file() else ""
+            if other and beside.parent != source:
+                assert other == folder or other in PLANT_FOLDERS[folder], (
+                    f"{path.relative_to(ROOT)} includes {name}"
+                )
+    assert seen == set(PLANT_FOLDERS)
 
 
 def test_an_extension_imports_no_other() -> None:

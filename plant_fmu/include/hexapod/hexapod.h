@@ -277,7 +277,7 @@ HX_API int hx_plant_update_contacts(hxPlant *plant);      /* 1: bristles changed
 HX_API int hx_plant_update_locks(hxPlant *plant, const hxInput *input);
 
 /* Computes derivatives of rates and outputs along a direction of input and coordinates, with
- * contacts held. They are exact to rounding (complex step, lanes/complex_step.h); contact flags
+ * contacts held. They are exact to rounding (complex step, packs/complex_step.h); contact flags
  * and the solver's counters have derivative 0. Changes and results may be NULL. Returns
  * HX_INVALID_ARGUMENT where the compiler has no complex numbers (MSVC). */
 HX_API hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input,

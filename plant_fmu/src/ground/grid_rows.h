@@ -1,12 +1,12 @@
-/* grid_rows.h - distance and normal of the ground under a row of contacts (eq. 31-34): the kernels
- * include it behind vec3.h */
+/* grid_rows.h - distance and normal of the ground under a row of contacts (eq. 31-34) */
 #ifndef HX_GRID_ROWS_H
 #define HX_GRID_ROWS_H
 
+#include "../packs/vec3.h"
 #include "surface.h"
 
 #ifndef HX_TANGENT
-#include "smooth.h" /* behind lanes.h */
+#include "smooth.h"
 #endif
 
 /* Distance of a point from the ground, and the ground's normal. */

@@ -1,9 +1,10 @@
 /* sharing.h - shares of the faces, edges and corners of blocks that carry the same spot of a foot;
- * models/contact/geometry.py is the readable form. For numbers with and without a derivative: the
- * kernels include it behind lanes.h. */
+ * models/contact/geometry.py is the readable form. For numbers with and without a derivative.
+ */
 #ifndef HX_SHARING_H
 #define HX_SHARING_H
 
+#include "../packs/lanes.h"
 #include "surface.h"
 
 enum { HX_SHARERS = HX_FACE_NEAREST }; /* faces of blocks that a foot touches at once, at most */

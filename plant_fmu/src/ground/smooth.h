@@ -1,8 +1,9 @@
 /* smooth.h - nearest points of a smooth surface (eq. 31, 32) to a pack of points: the kernels
- * include it behind lanes.h, surface.c with one lane, with the same bits for each point */
+ * include it, and surface.c with one lane, with the same bits for each point */
 #ifndef HX_SMOOTH_H
 #define HX_SMOOTH_H
 
+#include "../packs/lanes.h"
 #include "surface.h"
 
 /* Height over a point, its first and second derivatives. */

@@ -7,9 +7,7 @@
 #include "../elementary.h"
 
 #define HX_LANES 1
-#include "../lanes/lanes.h"
-
-#include "soil_law.h" /* behind the numbers that it computes with */
+#include "soil_law.h"
 
 _Static_assert(sizeof(hxSoils) == sizeof(hxSoil), "a soil consists of the same numbers");
 

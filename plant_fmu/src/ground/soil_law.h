@@ -1,15 +1,16 @@
-/* soil_law.h - forces of soft ground on a pack of feet (eq. 40-47): the kernels include it behind
- * lanes.h, soil.c with one lane, with the same bits for each foot
+/* soil_law.h - forces of soft ground on a pack of feet (eq. 40-47): the kernels include it, and
+ * soil.c with one lane, with the same bits for each foot
  *
  * z is the depth of the foot's lowest point under the undisturbed surface, z_p the plastic depth.
  */
 #ifndef HX_SOIL_LAW_H
 #define HX_SOIL_LAW_H
 
+#include "../packs/lanes.h"
 #include "soil.h"
 
 #ifndef HX_TANGENT
-#include "power.h"
+#include "../packs/power.h"
 #endif
 
 static const double pi = 3.14159265358979323846;

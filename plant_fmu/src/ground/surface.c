@@ -10,9 +10,7 @@
 #include "soil.h"
 
 #define HX_LANES 1
-#include "../lanes/lanes.h"
-
-#include "smooth.h" /* behind the numbers that it computes with */
+#include "smooth.h"
 
 const double hx_far = 1e3;
 

@@ -20,7 +20,7 @@
 
 #define HX_LANES 4
 
-#include "../lanes/entry_points.h"
+#include "entry_points.h"
 
 #if defined(__clang__)
 #pragma clang attribute pop

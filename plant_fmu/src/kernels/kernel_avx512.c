@@ -21,7 +21,7 @@
 
 #define HX_LANES 8
 
-#include "../lanes/entry_points.h"
+#include "entry_points.h"
 
 #if defined(__clang__)
 #pragma clang attribute pop

@@ -2,7 +2,7 @@
  * has no vector types */
 #include "../kernel.h"
 
-#include "../lanes/entry_points.h"
+#include "entry_points.h"
 
 static int always_available(void) { return 1; }
 

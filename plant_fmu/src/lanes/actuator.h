@@ -3,10 +3,10 @@
 #ifndef HX_ACTUATOR_H
 #define HX_ACTUATOR_H
 
-#include "vec3.h"
+#include "../packs/vec3.h"
 
 #ifndef HX_TANGENT
-#include "../ground/power.h" /* behind lanes.h */
+#include "../packs/power.h"
 #endif
 
 typedef struct {

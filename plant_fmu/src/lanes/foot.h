@@ -3,7 +3,7 @@
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
-#include "vec3.h"
+#include "../packs/vec3.h"
 
 #include "../ground/grid_rows.h"
 #include "../ground/sharing.h"

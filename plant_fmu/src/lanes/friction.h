@@ -3,7 +3,7 @@
 #ifndef HX_FRICTION_H
 #define HX_FRICTION_H
 
-#include "vec3.h"
+#include "../packs/vec3.h"
 
 /* Tangential force of a foot with bristles (eq. 16-18, 36, 37). */
 typedef struct {

@@ -5,9 +5,9 @@
 #ifndef HX_SOIL_PACK_H
 #define HX_SOIL_PACK_H
 
-#include "lanes.h"
+#include "../packs/lanes.h"
 
-#include "../ground/soil_law.h" /* behind lanes.h */
+#include "../ground/soil_law.h"
 
 _Static_assert(sizeof(hxSoil) == HX_SOIL_SIZE * sizeof(double), "a soil consists of numbers");
 

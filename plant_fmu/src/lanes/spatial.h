@@ -3,7 +3,7 @@
 #ifndef HX_SPATIAL_H
 #define HX_SPATIAL_H
 
-#include "vec3.h"
+#include "../packs/vec3.h"
 
 typedef struct {
   hxVec3 ang, lin;

@@ -1,5 +1,5 @@
 /* patches.c - nearest points of a smooth grid by patches that are kept, for the tests */
-#include "lanes/vec3.h"
+#include "packs/vec3.h"
 
 #include "ground/grid_rows.h"
 

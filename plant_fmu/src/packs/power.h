@@ -1,10 +1,12 @@
-/* power.h - powers of a pack of numbers in plain arithmetic: the kernels include it behind lanes.h,
+/* power.h - powers of a pack of numbers in plain arithmetic: the kernels include it, and
  * elementary.c with one lane, with the same bits for each number */
 #ifndef HX_POWER_H
 #define HX_POWER_H
 
 #include <math.h>
 #include <stdint.h>
+
+#include "lanes.h"
 
 /* Sums n terms of a polynomial in pairs of pairs, whose chains of operations overlap; n is a
  * multiple of 4. */

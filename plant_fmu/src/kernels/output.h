@@ -2,8 +2,8 @@
 #ifndef HX_OUTPUT_H
 #define HX_OUTPUT_H
 
-#include "clearance.h"
-#include "dynamics.h"
+#include "../lanes/clearance.h"
+#include "../lanes/dynamics.h"
 #ifndef HX_TANGENT
 #include "../measure/measure.h"
 #endif

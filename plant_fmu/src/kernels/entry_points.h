@@ -1,8 +1,8 @@
 /* entry_points.h - functions of a kernel's table, built from the physics on lanes; each kernel_*.c
  * includes it once, at its width */
 #include "../kernel.h"
-#include "coordinates.h"
-#include "dynamics.h"
+#include "../lanes/coordinates.h"
+#include "../lanes/dynamics.h"
 #include "integrator.h"
 #include "output.h"
 

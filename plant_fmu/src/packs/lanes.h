@@ -2,8 +2,8 @@
  *
  * All arithmetic on legs uses this type with the operators of C. The width follows the instruction
  * set. The result of a lane does not depend on the width, because every operation is exact IEEE
- * arithmetic lane by lane (no contraction, no libm). The headers in this folder hold the physics
- * on lanes; each kernel_*.c includes them once, at its own width.
+ * arithmetic lane by lane (no contraction, no libm). The headers in ground, lanes and measure hold
+ * the physics on packs; each kernel_*.c includes them once, at its own width.
  */
 #ifndef HX_LANES_H
 #define HX_LANES_H
