@@ -60,7 +60,8 @@ def test_units_reach_into_commands_events_and_settings() -> None:
     assert scenario.commands[0].yaw_rate == pytest.approx(math.radians(10.0))
     assert scenario.commands[0].height == -0.005
     assert scenario.settings["terrain"]["incline"] == pytest.approx(math.radians(5.0))
-    assert (scenario.events[0].time, scenario.events[0].force) == (0.01, (1000.0, 0.0, 0.0))
+    push = scenario.events_of(Push)[0]
+    assert (push.time, push.force) == (0.01, (1000.0, 0.0, 0.0))
 
 
 def test_soil_is_set_by_the_name_of_a_preset() -> None:

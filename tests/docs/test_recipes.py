@@ -161,8 +161,8 @@ def compiled_drag(copy: Path, *, law: int, slope: float, speed: float) -> float:
     sources = [copy / "ask.c", copy / "plant_fmu" / "src" / "elementary.c"]
     includes = [f"-I{copy / 'plant_fmu' / name}" for name in ("src", "include")]
     number = f"-DHX_FRICTION_RATIONAL={law}"  # as `make generate` numbers it
-    command = ["cc", "-std=c11", "-shared", "-fPIC", number, *includes, "-o", copy / "ask.so"]
-    subprocess.run([*command, *sources, "-lm"], check=True)
+    command = ["cc", "-std=c11", "-shared", "-fPIC", number, *includes, "-o", str(copy / "ask.so")]
+    subprocess.run([*command, *map(str, sources), "-lm"], check=True)
     library = ctypes.CDLL(str(copy / "ask.so"))
     library.ask.restype = ctypes.c_double
     library.ask.argtypes = [ctypes.c_int, ctypes.c_double, ctypes.c_double]
