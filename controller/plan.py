@@ -99,8 +99,6 @@ class WalkPlan(Stateful):
         absence, home = self.absence, self.paths.aims()
         return self.ramp.aim(self.pace.follow(command, home, absence.goal, absence.legs))
 
-    # ---------------------------------------------------------------------------------- a step
-
     def _look_ahead(self, ahead: int, number: int) -> tuple[Array, Posture, Twist]:
         """Returns command value, posture and body motion `ahead` periods after the present step.
 
@@ -122,8 +120,6 @@ class WalkPlan(Stateful):
         value, posture, twist = self._look_ahead(1, number)
         feet = self.paths.walk(number, twist, before.feet)
         return self.planner.lay_out(value, posture, feet, self.paths.clock, self.absence, 1)
-
-    # --------------------------------------------------------------------------------- sections
 
     def _follow_sensors(self, compliant: Compliant) -> None:
         """Notes which feet have met the ground on their way down (C51), and narrows the stance.
@@ -234,8 +230,6 @@ class WalkPlan(Stateful):
         if self.compliant is None:
             self.paths.narrowing = 0.0
         self.after, self.cut = None, True
-
-    # ------------------------------------------------------------------------- the present step
 
     def _rate_of(self, name: str) -> Any:
         """Returns the rate of a quantity per second by differences, one-sided at section ends."""

@@ -121,11 +121,11 @@ def assign_cells(robot: Robot, body: Array, contacts: Contacts) -> Contacts:
     if surface is None:
         return contacts
     states = zip(candidates(robot), contacts.states, strict=True)
-    touching = {point.leg for point, state in states if not state.is_open}
+    in_contact = {point.leg for point, state in states if not state.is_open}
     cells: list[Cell | None] = []
     for leg, at in enumerate(foot_centres(robot, body)):
         below = cell_at(surface, float(at[0]), float(at[1]))
-        cells.append((contacts.cell[leg] or below) if leg in touching else None)
+        cells.append((contacts.cell[leg] or below) if leg in in_contact else None)
     return replace(contacts, cell=tuple(cells))
 
 

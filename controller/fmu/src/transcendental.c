@@ -1,3 +1,4 @@
+/* transcendental.c - reduces arguments exactly and evaluates rational functions and polynomials */
 #include "transcendental.h"
 
 #include <math.h>
