@@ -29,7 +29,7 @@ def write_law(name: str, folder: Path) -> list[Path]:
         raise HexapodError(
             "not a name of a controller",
             got=name,
-            expected="letters, digits and underscores, as in the name of a Python module",
+            expected="letters, digits and underscores, and no word of the language such as class",
             fix="write hexapod controller new my_walk",
         )
     stem, kind = module_name(name), class_name(name)
