@@ -42,7 +42,7 @@ GRAVITY = Number("m/s2", above=0.0)  # along -z; or three numbers, a vector in w
 GRAVITY_VECTOR = Vector("m/s2", 3)
 GRAVITY_NAMES = ("gravity[1]", "gravity[2]", "gravity[3]")  # the FMU's parameters
 ZERO = (0.0, 0.0, 0.0)
-E = TypeVar("E", bound=Event)
+_Event = TypeVar("_Event", bound=Event)
 ALL_PARTS = Parts()
 MAX_STEPS = 1_000_000  # a row of the recording is about 3 kB, and all rows are in memory
 
@@ -157,7 +157,7 @@ class Scenario:
         timing = {"name", "period", "duty"} & set(self.settings.get("gait", {}))
         return bool(timing) or self.stance is not None
 
-    def events_of(self, kind: type[E]) -> tuple[E, ...]:
+    def events_of(self, kind: type[_Event]) -> tuple[_Event, ...]:
         """Returns the events of one kind in their order in the file."""
         return tuple(event for event in self.events if isinstance(event, kind))
 
