@@ -80,8 +80,10 @@ def simulate(
         RuntimeWarning: the run ended early, with the reason: its metrics are NaN.
     """
     check_type(scenario, (str, Path, Scenario), "a name, a path or a Scenario", where="scenario")
-    check_type(settings or {}, Mapping, "a dict of values by name", where="settings")
-    check_type(gains or "", (str, Path, Gains), "gains or the path of their file", where="gains")
+    if settings is not None:
+        check_type(settings, Mapping, "a dict of values by name", where="settings")
+    if gains is not None:
+        check_type(gains, (str, Path, Gains), "gains or the path of their file", where="gains")
     text = controller.text if isinstance(controller, Control) else controller
     text = text if isinstance(text, str) else None
     law = None if text is not None else controller

@@ -4,7 +4,7 @@ Every period controller.py provides a plan of the present step: joint angles, th
 feet, and the torques for these forces. Compliant control corrects the plan by the measurements:
 
     foot forces -- sense (C22) --> force laws (force_laws.py, C23 to C36) --> torque, offset
-    joint angles, attitude -- look, every 40 ms --> slow loops (hold.py, C37 to C40) --> lift, v, w
+    joint angles, attitude -- every 40 ms --> slow loops (hold.py, C37 to C40) --> lift, v, w
     planned angles + climb (offset + lift) ---> angle_ref (C41)
 
 The force laws act in the same period, on torques and heights of the feet. Of the slow loops,

@@ -3,9 +3,9 @@
 C: hold.h. Standing feet are fixed to the ground, so their positions by the joint encoders give the
 height and tilt of the torso over them (C37). This tilt and that of the attitude sensor give the
 inclination of the ground. The torso is held parallel to the smoothed inclination; fast tilts are
-corrected by the sensor (C38). Between two looks, the feet that stood all the time give the path of
-the torso over the ground (C39); its deviation from the command is corrected by an addition to the
-commanded velocity (C40).
+corrected by the sensor (C38). Between two updates, the feet that stood all the time give the path
+of the torso over the ground (C39); its deviation from the command is corrected by an addition to
+the commanded velocity (C40).
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from hexapod_cosim.controller.gains import HoldGains, Parts
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis, clamp
 
-LOOK_TIME = 0.04  # s    between two looks, at least a period
+UPDATE_TIME = 0.04  # s    between two updates, at least a period
 LOADED_FROM = 0.4  # 1    thirds of the weight; a foot with more load does not slide
 DETERMINANT_FLOOR = 1e-6  # m4    feet on one line determine no plane
 
 
 class HoldInput(NamedTuple):
-    """Measurements at a look; feet (6,) are in the walking frame."""
+    """Measurements at an update; feet (6,) are in the walking frame."""
 
     plane: Plane  # m    contact points by the encoders, x + i y
     height: Array  # m    centres of the feet by the encoders, z
@@ -74,14 +74,14 @@ class Hold(Stateful):
         ground: (2,) inclination of the ground, roll and pitch [rad]; None: not known yet.
         angle, height: (2,) roll and pitch and the height of the correction [rad, m].
         last: contact points (6,) turned by the yaw [m], their loads (6,) [1] and the yaw [rad] at
-            the last look; None: there was none.
+            the last update; None: there was none.
     """
 
     STATE = ("lift", "velocity", "yaw_rate", "way", "heading", "ground", "angle", "height", "last")
 
     def __init__(self, gains: HoldGains, parts: Parts, *, period: float) -> None:
         self.gains, self.parts = gains, parts
-        self.every = max(1, round(LOOK_TIME / period))  # periods between two looks
+        self.every = max(1, round(UPDATE_TIME / period))  # periods between two updates
         self.time = self.every * period  # s
         self.smooth = min(self.time / gains.ground_time, 1.0)
         self.reset()
@@ -114,7 +114,7 @@ class Hold(Stateful):
         self.lift = seen.planned.real * pitch - seen.planned.imag * roll - self.height
 
     def _add_lost_way(self, seen: HoldInput, feet: Plane) -> None:
-        """Adds the deviation of the path since the last look (C39).
+        """Adds the deviation of the path since the last update (C39).
 
         feet: (6,) contact points turned by the yaw [m].
         """

@@ -53,8 +53,9 @@ def simulate(
     from hexapod_cosim.cosim.scenario.records import FORMATS
     from hexapod_cosim.models import unknown_name
 
-    for name in set(formats or []) - set(FORMATS):
-        raise unknown_name("format", name, FORMATS, where="--format")
+    for name in formats or []:
+        if name not in FORMATS:
+            raise unknown_name("format", name, FORMATS, where="--format")
     given = [*(settings or []), *([f"outputs.formats={formats!r}"] if formats else [])]
     words = Words(control, given, engine=engine, fmu=fmu, gains=gains, accuracy=accuracy)
     with TemporaryFolder("package") as folder:

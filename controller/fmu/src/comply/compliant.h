@@ -176,9 +176,9 @@ static inline void hx_compliant_steer(const hxCompliantModel *model, int64_t ste
 /* ------------------------------------------------------------------------------------ sensors */
 
 /* Passes the measured positions of the standing feet to the slow loops. */
-static inline void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
-                        const hxPresentStep *present, const hxControllerInput *input,
-                        hxCompliant *compliant) {
+static inline void update_hold(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
+                               const hxPresentStep *present, const hxControllerInput *input,
+                               hxCompliant *compliant) {
   const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
                z = input->quaternion[3];
   hxHoldInput seen;
@@ -226,7 +226,7 @@ static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegS
   hx_force_laws_step(&model->laws, &present->load, force, laws);
   if (compliant->count % model->hold.every == 0) {
     if (laws->trust.level == 1.0)
-      look(model, leg, present, input, compliant);
+      update_hold(model, leg, present, input, compliant);
     else
       memset(&compliant->hold, 0, sizeof compliant->hold);
   }

@@ -41,7 +41,7 @@ typedef struct hxHold {
   double load[HX_LEGS], yaw; /* 1, rad, at the last update */
 } hxHold;
 
-static const double look_time = 0.04; /* s, interval of the loops, at least a period */
+static const double update_time = 0.04; /* s, interval of the loops, at least a period */
 /* 1, in thirds of the weight: a foot with a larger load does not slip */
 static const double loaded_from = 0.4;
 static const double determinant_floor = 1e-6;       /* m4, feet on one line define no plane */
@@ -86,7 +86,7 @@ static inline int fit_plane(const hxHoldInput *seen, double fit[3]) {
 }
 
 static inline void hx_hold_compile(const hxControllerDefinition *definition, hxHoldModel *model) {
-  const double every = nearbyint(look_time / definition->period);
+  const double every = nearbyint(update_time / definition->period);
   model->every = every < 1.0 ? 1 : (int64_t)every;
   model->time = (double)model->every * definition->period;
   model->posture = definition->parts.posture;
