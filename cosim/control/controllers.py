@@ -212,21 +212,22 @@ def control_facts(scenario: Scenario, law: Any = None) -> dict[str, Any]:
     control = control_of(scenario.control)
     facts: dict[str, Any] = {"kind": control.kind, "text": control.text}
     if control.path is not None:
-        facts["sha256"] = file_hash(control)
+        facts["sha256"] = _file_hash(control.path)
     if scenario.control_settings:
         facts["parameters"] = dict(scenario.control_settings)
     return facts
 
 
-def file_hash(control: Control) -> str:
+def _file_hash(path: Path) -> str:
     """Returns the SHA-256 of a control's file, in hex. Raises HexapodError."""
-    if control.path is None:
-        return ""
     try:
-        return hashlib.sha256(control.path.read_bytes()).hexdigest()
+        return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
         raise HexapodError(
-            "cannot read the control's file", got=error.strerror, where=str(control.path)
+            "cannot read the control's file",
+            got=error.strerror,
+            fix="correct the path, or allow to read the file",
+            where=str(path),
         ) from error
 
 

@@ -107,7 +107,13 @@ class ControllerFmu3:
             slave.instantiate(logMessage=self._log, loggingOn=True)
         except Exception as error:
             self._directory.close()
-            raise FmuError("the FMU cannot be loaded", got=str(error), where=str(path)) from error
+            raise FmuError(
+                "the FMU cannot be loaded",
+                got=str(error),
+                expected=f"an FMU of FMI 3.0 with a binary for {platform_tuple}",
+                fix="export it again on this machine with `hexapod export`",
+                where=str(path),
+            ) from error
         self.slave = slave
 
     def _log(self, _environment: Any, _status: Any, _category: Any, message: Any) -> None:
@@ -134,7 +140,10 @@ class ControllerFmu3:
         kinds = {self.variables[name].type for name in names} or {"Float64"}
         if len(kinds) != 1:
             raise FmuError(
-                "a block holds variables of one type", got=sorted(kinds), where=str(self.path)
+                "connected variables of several types",
+                got=sorted(kinds),
+                fix="give its inputs one floating-point type, and its outputs one",
+                where=str(self.path),
             )
         return Block3(self, names, kinds.pop(), sum(self._size(name) for name in names))
 

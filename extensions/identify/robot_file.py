@@ -66,7 +66,12 @@ def _document(path: Path, folder: Path) -> Any:
             return document
         document = tomlkit.parse(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise HexapodError("cannot read", got=error.strerror, where=str(path)) from error
+        raise HexapodError(
+            "cannot read the robot file again",
+            got=error.strerror,
+            fix="do not move the file while its robot is identified",
+            where=str(path),
+        ) from error
     for section in ("urdf", "terrain"):
         table: Any = document.get(section, {})
         if "file" in table:
