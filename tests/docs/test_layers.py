@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pages import COMMANDS
 
 from hexapod_cosim.cosim.common.plant_files import SHARED_HEADERS
 
@@ -78,6 +79,7 @@ STANDARD_C = {
     "stdbool.h",
     "limits.h",
 }
+TICKED = re.compile(r"`([\w.]+)`")
 INTRINSICS = {"immintrin.h"}  # of the compiler
 
 
@@ -145,6 +147,30 @@ def test_an_extension_imports_no_other() -> None:
         for name in imports(path):
             if name.startswith(f"{PACKAGE}.extensions."):
                 assert name.split(".")[2] == own, f"{path.relative_to(ROOT)} imports {name}"
+
+
+def documented_modules() -> set[str]:
+    """Returns the modules of the core that docs/architecture.md opens to extensions."""
+    page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)`[^|]*\|[^|]*\|([^|]*)\|$", page, re.MULTILINE)
+    found = {f"cosim.{room}.{name}" for room, names in rows for name in TICKED.findall(names)}
+    (text,) = re.findall(r"^They use the core's modules.*?; a test", page, re.MULTILINE | re.DOTALL)
+    folder = ""
+    for name in TICKED.findall(text):
+        if name.startswith(PACKAGE):
+            folder = name.removeprefix(f"{PACKAGE}.")
+        found.add(folder if name.startswith(PACKAGE) else f"{folder}.{name}")
+    return found
+
+
+def test_extensions_use_the_documented_modules_of_the_core() -> None:
+    names = {name for path in python_files("extensions") for name in imports(path)}
+    below = (f"{PACKAGE}.models", f"{PACKAGE}.controller", f"{PACKAGE}.cosim")
+    used = {name.removeprefix(f"{PACKAGE}.") for name in names if name.startswith(below)}
+    documented = documented_modules()
+    assert used <= documented, f"{used - documented} are no modules for extensions"
+    if all((ROOT / "extensions" / name).is_dir() for name in COMMANDS):
+        assert documented == used  # what none uses is listed in vain
 
 
 @pytest.mark.parametrize("folder", MAY_USE)
