@@ -32,7 +32,7 @@ from hexapod_cosim.cosim.scenario.controls import (
     parse_control,
 )
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.models import FmuError, HexapodError, nearest_name
+from hexapod_cosim.models import FmuError, HexapodError, suggestion
 
 
 @contextmanager
@@ -194,12 +194,11 @@ def _check_taken(names: Sequence[str], found: Sequence[Taken], where: str) -> No
     known = [name for item in found for name in item.names]
     for name in names:
         if name not in known and not any(item.every for item in found):
-            near = nearest_name(name, known)
             raise ControllerError(
                 "no control takes this parameter",
                 got=name,
                 expected=f"one of {', '.join(known)}" if known else "no parameter",
-                fix=f"did you mean {near!r}?" if near else "take it away",
+                fix=suggestion(name, known, otherwise="take it away"),
                 where=where,
             )
 

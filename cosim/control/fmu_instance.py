@@ -23,7 +23,7 @@ from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_block import FmuVariable, StepError
 from hexapod_cosim.models import FmuError
-from hexapod_cosim.models.errors import nearest_name
+from hexapod_cosim.models.errors import suggestion
 
 REAL3, FLAG3 = ("Float64", "Float32"), "Boolean"
 MAX_TRIED = 64  # files whose trials are kept; the least recently used one goes first
@@ -152,11 +152,10 @@ class ControllerFmu3:
         for name, value in values.items():
             variable = self.variables.get(name)
             if variable is None or variable.causality != "parameter":
-                near = nearest_name(name, self.variables)
                 raise FmuError(
                     "the FMU has no such parameter",
                     got=name,
-                    fix=f"did you mean {near!r}?" if near else None,
+                    fix=suggestion(name, self.variables, otherwise="take it away"),
                     where=str(self.path),
                 )
             convert = float if variable.type in REAL3 else bool if variable.type == FLAG3 else int

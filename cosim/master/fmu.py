@@ -28,7 +28,7 @@ from hexapod_cosim.cosim.master.fmu_block import (
     StepError,
     parameter_number,
 )
-from hexapod_cosim.models.errors import FmuError, nearest_name
+from hexapod_cosim.models.errors import FmuError, suggestion
 
 LAST_SUCCESSFUL_TIME = 2  # fmi2StatusKind
 
@@ -222,8 +222,8 @@ class Fmu(Closing):
         return variable
 
     def _unknown(self, name: str, valid: Sequence[str] = ()) -> FmuError:
-        near = nearest_name(name, valid or self.variables)
-        fix = f"did you mean {near!r}?" if near else "`fmpy info` lists the names it has"
+        otherwise = "`fmpy info` lists the names it has"
+        fix = suggestion(name, valid or self.variables, otherwise=otherwise)
         return FmuError("the FMU has no such variable", got=name, fix=fix, where=str(self.path))
 
     def initialise(

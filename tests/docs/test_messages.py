@@ -1,4 +1,6 @@
-"""Errors of the product say at least two of what was got, what was expected and what to do."""
+"""Errors of the product say at least two of what was got, what was expected and what to do; names
+that are proposed are near to the given one.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +8,12 @@ import ast
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexapod_cosim.cosim.master.recorder import ColumnError, Recording
+from hexapod_cosim.models.errors import nearest_name
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("models", "plant_fmu", "fmi", "controller", "cosim", "extensions", "packaging")
@@ -86,3 +94,29 @@ def test_no_quoted_message_is_listed_in_vain() -> None:
     short = {place for place, _, given in _errors() if len(given) < 2}
     present = {place for place in QUOTED if (ROOT / place[0]).is_file()}
     assert present <= short
+
+
+COLUMNS = ("time", "torso.position[1]", "torso.roll", "LF.foot.force[3]", "LF.foot.contact")
+
+
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [
+        ("torso.pos", "torso.position[1]"),  # torso.roll is more similar
+        ("torso.position[4]", "torso.position[1]"),
+        ("LF.foot", "LF.foot.force[3]"),
+        ("LF.foot.contct", "LF.foot.contact"),
+        ("tim", "time"),
+        ("to", None),
+        ("", None),
+    ],
+)
+def test_a_name_that_continues_the_given_one_is_the_nearest(name: str, near: str | None) -> None:
+    assert nearest_name(name, COLUMNS) == near
+
+
+def test_an_unknown_column_is_refused_with_the_nearest_name() -> None:
+    with pytest.raises(ColumnError, match=r"got 'torso\.pos'; did you mean 'torso\.position\[1\]'"):
+        Recording(COLUMNS, np.zeros((2, 5))).column("torso.pos")
+    with pytest.raises(ColumnError, match=r"got 'servo'; record it: outputs\.csv names"):
+        Recording(COLUMNS, np.zeros((2, 5))).column("servo")
