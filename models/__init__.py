@@ -15,7 +15,7 @@ from hexapod_cosim.models.errors import (
     ReachError,
     RobotError,
     ScenarioError,
-    nearest_name,
+    suggestion,
     unknown_name,
 )
 from hexapod_cosim.models.friction import FRICTION_LAWS, Friction
@@ -52,6 +52,6 @@ __all__ = [
     "TERRAINS", "Baumgarte", "BodyContact", "Contact", "FmuError", "Foot", "Friction", "Gait",
     "HexapodError", "Leg", "Link", "ReachError", "Robot", "RobotError", "ScenarioError", "Servo",
     "Soil", "Solver", "Terrain", "Torso", "box_inertia", "check_robot", "foot_position",
-    "foot_positions", "hertz_stiffness", "list_robots", "load_robot", "nearest_name",
-    "robot_from_table", "unknown_name",
+    "foot_positions", "hertz_stiffness", "list_robots", "load_robot", "robot_from_table",
+    "suggestion", "unknown_name",
 ]  # fmt: skip

@@ -122,14 +122,28 @@ class FmuError(HexapodError):
 LEAST_SIMILARITY = 0.5  # of difflib, in [0, 1]
 # up to this similarity, names with different first letters share letters by chance: "foo", "robot"
 CHANCE = 0.52
+LEAST_BEGINNING = 3  # characters of a name's beginning that say which name is meant
 
 
 def nearest_name(name: str, valid: Iterable[str]) -> str | None:
-    """Returns the valid name most similar to `name`, or None when none is similar."""
-    for match in get_close_matches(name, list(valid), cutoff=LEAST_SIMILARITY):
+    """Returns the valid name most similar to `name`, or None when none is similar.
+
+    The first one that begins with `name` precedes all others.
+    """
+    names = list(valid)
+    longer = [one for one in names if one.startswith(name)]
+    if longer and len(name) >= LEAST_BEGINNING:
+        return longer[0]
+    for match in get_close_matches(name, names, cutoff=LEAST_SIMILARITY):
         if match[:1] == name[:1] or SequenceMatcher(None, match, name).ratio() > CHANCE:
             return match
     return None
+
+
+def suggestion(name: str, valid: Iterable[str], *, otherwise: str) -> str:
+    """Returns the fix for an unknown name: the valid name nearest to it, or another fix."""
+    near = nearest_name(name, valid)
+    return f"did you mean {near!r}?" if near else otherwise
 
 
 def unknown_name(
@@ -145,8 +159,7 @@ def unknown_name(
     The message lists the valid names and proposes the most similar one.
     """
     names = list(valid)
-    near = nearest_name(name, names)
-    fix = f"did you mean {near!r}?" if near else "write one of these names"
+    fix = suggestion(name, names, otherwise="write one of these names")
     return error(
         f"unknown {kind}", got=name, expected=f"one of {', '.join(names)}", fix=fix, where=where
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,11 @@ def cross(a: Array, b: Array) -> Array:
 
 def rotation_matrix(p: Array) -> Array:
     """Returns the rotation (3, 3), body to world, of a quaternion of any length (eq. 5)."""
-    w, x, y, z = (p / math.sqrt(p @ p)).tolist()
+    return unit_rotation(*(p / math.sqrt(p @ p)).tolist())
+
+
+def unit_rotation(w: Any, x: Any, y: Any, z: Any) -> Array:
+    """Returns the rotation (3, 3), body to world, of a unit quaternion (eq. 5); of n: (3, 3, n)."""
     return np.array(
         [
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],

@@ -171,8 +171,11 @@ class Whole:
 
     def read(self, value: Any, where: str) -> int:
         """Returns the value. Raises RobotError; `where` names the key."""
-        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        if isinstance(value, bool) or not isinstance(value, int):
             raise wrong_type(value, self.expected, "write 1 or another whole number", where)
+        if value < 0:
+            what, fix = "out of range", "write 0 or a larger whole number"
+            raise RobotError(what, got=value, expected=self.expected, fix=fix, where=where)
         return value
 
 

@@ -36,21 +36,14 @@ from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.controller.walk.swing import Twist
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.kinematics import unit_rotation
 
 STEERING_TIME = 0.1  # s    duration of the ramp from one added velocity to the next
 
 
 def sense(measurement: Measurement, posture: Posture) -> Array:
     """Returns the foot forces (6, 3) in the walking frame [N]: f_K = R_KT R_TW f_W (C22)."""
-    w, x, y, z = measurement.quaternion.tolist()
-    xx, yy, zz = x * x, y * y, z * z
-    R_WT = np.array(
-        [
-            [1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)],
-        ]
-    )
+    R_WT = unit_rotation(*measurement.quaternion.tolist())
     force = measurement.foot_force @ R_WT
     return force if posture.level else np.asarray(force @ posture.R_KT.T)
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import astuple, dataclass
+from numbers import Real
 
 import numpy as np
 
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import Array
 from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models.errors import check_type
 
 
 @dataclass(frozen=True)
@@ -22,6 +25,17 @@ class BodyCommand:
     height: float = 0.0  # m    above the stance
     roll: float = 0.0  # rad    z-y-x; positive lowers the right side
     pitch: float = 0.0  # rad    positive lowers the nose
+
+    def __post_init__(self) -> None:
+        """Raises HexapodError for a field that is not a finite number."""
+        expected = "a finite number"
+        for name, value in vars(self).items():
+            check_type(value, Real, expected, where=name)
+            if not math.isfinite(value):
+                fix = "check where the command comes from"
+                raise HexapodError(
+                    "impossible body command", got=value, expected=expected, fix=fix, where=name
+                )
 
 
 class CommandRamp(Stateful):
@@ -63,22 +77,12 @@ class CommandRamp(Stateful):
         self._cubic = np.array([value, slope, 3.0 * gap - 2.0 * slope, slope - 2.0 * gap])
 
     def aim(self, target: BodyCommand) -> bool:
-        """Starts a ramp to a command. Returns whether the command is a new one.
-
-        Raises HexapodError for a number that is not finite.
-        """
+        """Starts a ramp to a command. Returns whether the command is a new one."""
         if target == self.target:
             return False
-        goal = np.array(astuple(target), dtype=np.float64)
-        if not np.isfinite(goal).all():
-            raise HexapodError(
-                "impossible body command",
-                got=target,
-                expected="finite numbers",
-                fix="check where the command comes from",
-            )
         value, rate = self.ahead(0)
-        self.target, self._goal, self.steps = target, goal, 0
+        self.target, self.steps = target, 0
+        self._goal = np.array(astuple(target), dtype=np.float64)
         self._bend(value, rate)
         return True
 

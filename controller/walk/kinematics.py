@@ -107,14 +107,18 @@ class LegSolver:
 
         angle: (..., 6, 3) of the joints [rad].
         """
+        x, z, c, s = self._leg_planes(angle)
+        forward, aside = c * x - s * self.offset_y, s * x + c * self.offset_y
+        return np.asarray(np.stack([forward, aside, z], axis=-1) + self.hip.T)
+
+    def _leg_planes(self, angle: Array) -> tuple[Array, Array, Array, Array]:
+        """Returns x and z of the feet [m] and the cosine and sine of the headings of their legs."""
         a = angle[..., 1] + self.femur_tilt
         b = angle[..., 1] - angle[..., 2] + self.tibia_tilt
         x = self.coxa_length + self.femur * np.cos(a) + self.tibia * np.cos(b)
         z = self.coxa_height + self.femur * np.sin(a) + self.tibia * np.sin(b)
         heading = self.hip_yaw + angle[..., 0]
-        c, s = np.cos(heading), np.sin(heading)
-        forward, aside = c * x - s * self.offset_y, s * x + c * self.offset_y
-        return np.asarray(np.stack([forward, aside, z], axis=-1) + self.hip.T)
+        return x, z, np.cos(heading), np.sin(heading)
 
     def rolling(self, angle: Array) -> Array:
         """Returns the distances that the feet have rolled outwards since the stance (6,) [m]."""
@@ -229,12 +233,8 @@ class LegSolver:
 
         Rows are axes, columns joints. angle: (6, 3) [rad].
         """
-        a = angle[..., 1] + self.femur_tilt
+        x, z, c, s = self._leg_planes(angle)
         b = angle[..., 1] - angle[..., 2] + self.tibia_tilt
-        x = self.coxa_length + self.femur * np.cos(a) + self.tibia * np.cos(b)
-        z = self.coxa_height + self.femur * np.sin(a) + self.tibia * np.sin(b)
-        heading = self.hip_yaw + angle[..., 0]
-        c, s = np.cos(heading), np.sin(heading)
         jacobian = np.zeros((*angle.shape, 3))
         jacobian[:, 0, 0] = -s * x - c * self.offset_y
         jacobian[:, 1, 0] = c * x - s * self.offset_y

@@ -49,9 +49,9 @@ def compare(
     --control these are kinematic, paper and compliant. Where the scenario names neither gait nor
     stance, and no gains are given, these two are in the tables too, without recordings.
     """
-    from hexapod_cosim.cosim.cli import comparison
+    from hexapod_cosim.cosim.cli import paired_runs
     from hexapod_cosim.cosim.cli.runs import RunOptions, Words
 
     words = Words(control, settings or [], engine, fmu, gains, seeds, accuracy)
     options = RunOptions.read(fmu=fmu, gains=gains, engine=engine, runs=seeds)
-    return comparison.compare(scenario, words, options, output=output, as_json=json)
+    return paired_runs.compare(scenario, words, options, output=output, as_json=json)

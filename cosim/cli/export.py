@@ -107,7 +107,7 @@ def export(
     """Pack the plant FMU of a robot, or its controller's, or both as a package, or write the
     robot for other tools.
     """
-    from hexapod_cosim.cosim.cli.exports import Request, write_export
+    from hexapod_cosim.cosim.cli.exported_files import Request, write_export
 
     request = Request(
         context=context,

@@ -48,7 +48,7 @@ def simulate(
     """
     from hexapod_cosim.cosim.cli.package import read_package
     from hexapod_cosim.cosim.cli.runs import RunOptions, Words
-    from hexapod_cosim.cosim.cli.simulation import simulate_each
+    from hexapod_cosim.cosim.cli.scenario_runs import simulate_each
     from hexapod_cosim.cosim.common.temporary import TemporaryFolder
     from hexapod_cosim.cosim.scenario.records import FORMATS
     from hexapod_cosim.models import unknown_name

@@ -32,7 +32,7 @@ from hexapod_cosim.cosim.scenario.controls import (
     parse_control,
 )
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.models import FmuError, HexapodError, nearest_name
+from hexapod_cosim.models import FmuError, HexapodError, suggestion
 
 
 @contextmanager
@@ -194,12 +194,11 @@ def _check_taken(names: Sequence[str], found: Sequence[Taken], where: str) -> No
     known = [name for item in found for name in item.names]
     for name in names:
         if name not in known and not any(item.every for item in found):
-            near = nearest_name(name, known)
             raise ControllerError(
                 "no control takes this parameter",
                 got=name,
                 expected=f"one of {', '.join(known)}" if known else "no parameter",
-                fix=f"did you mean {near!r}?" if near else "take it away",
+                fix=suggestion(name, known, otherwise="take it away"),
                 where=where,
             )
 
@@ -212,21 +211,22 @@ def control_facts(scenario: Scenario, law: Any = None) -> dict[str, Any]:
     control = control_of(scenario.control)
     facts: dict[str, Any] = {"kind": control.kind, "text": control.text}
     if control.path is not None:
-        facts["sha256"] = file_hash(control)
+        facts["sha256"] = _file_hash(control.path)
     if scenario.control_settings:
         facts["parameters"] = dict(scenario.control_settings)
     return facts
 
 
-def file_hash(control: Control) -> str:
+def _file_hash(path: Path) -> str:
     """Returns the SHA-256 of a control's file, in hex. Raises HexapodError."""
-    if control.path is None:
-        return ""
     try:
-        return hashlib.sha256(control.path.read_bytes()).hexdigest()
+        return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
         raise HexapodError(
-            "cannot read the control's file", got=error.strerror, where=str(control.path)
+            "cannot read the control's file",
+            got=error.strerror,
+            fix="correct the path, or allow to read the file",
+            where=str(path),
         ) from error
 
 

@@ -23,7 +23,7 @@ from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_block import FmuVariable, StepError
 from hexapod_cosim.models import FmuError
-from hexapod_cosim.models.errors import nearest_name
+from hexapod_cosim.models.errors import suggestion
 
 REAL3, FLAG3 = ("Float64", "Float32"), "Boolean"
 MAX_TRIED = 64  # files whose trials are kept; the least recently used one goes first
@@ -107,7 +107,13 @@ class ControllerFmu3:
             slave.instantiate(logMessage=self._log, loggingOn=True)
         except Exception as error:
             self._directory.close()
-            raise FmuError("the FMU cannot be loaded", got=str(error), where=str(path)) from error
+            raise FmuError(
+                "the FMU cannot be loaded",
+                got=str(error),
+                expected=f"an FMU of FMI 3.0 with a binary for {platform_tuple}",
+                fix="export it again on this machine with `hexapod export`",
+                where=str(path),
+            ) from error
         self.slave = slave
 
     def _log(self, _environment: Any, _status: Any, _category: Any, message: Any) -> None:
@@ -134,7 +140,10 @@ class ControllerFmu3:
         kinds = {self.variables[name].type for name in names} or {"Float64"}
         if len(kinds) != 1:
             raise FmuError(
-                "a block holds variables of one type", got=sorted(kinds), where=str(self.path)
+                "connected variables of several types",
+                got=sorted(kinds),
+                fix="give its inputs one floating-point type, and its outputs one",
+                where=str(self.path),
             )
         return Block3(self, names, kinds.pop(), sum(self._size(name) for name in names))
 
@@ -143,11 +152,10 @@ class ControllerFmu3:
         for name, value in values.items():
             variable = self.variables.get(name)
             if variable is None or variable.causality != "parameter":
-                near = nearest_name(name, self.variables)
                 raise FmuError(
                     "the FMU has no such parameter",
                     got=name,
-                    fix=f"did you mean {near!r}?" if near else None,
+                    fix=suggestion(name, self.variables, otherwise="take it away"),
                     where=str(self.path),
                 )
             convert = float if variable.type in REAL3 else bool if variable.type == FLAG3 else int

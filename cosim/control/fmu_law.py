@@ -165,15 +165,15 @@ def source_row(command: BodyCommand, measurement: Measurement) -> NDArray[np.flo
 
 
 @dataclass(frozen=True)
-class FmuWalk:
+class StanceAndGait:
     """Stance and gait of a controller FMU."""
 
     stance: tuple[Vector3, ...] | None  # rad  by leg and joint; None: it has none
     gait: Mapping[str, Any]  # arguments of make_gait(); empty: it has none
 
 
-def walk_of_fmu(path: Path) -> FmuWalk:
-    """Returns the walk of a controller FMU.
+def stance_and_gait(path: Path) -> StanceAndGait:
+    """Returns stance and gait of a controller FMU.
 
     The angles of the stance are the start values of its parameters `{leg}.{joint}.stance`, or of
     the array `stance` of an FMU of FMI 3.0. The gait is read from those of gait.pattern,
@@ -183,8 +183,8 @@ def walk_of_fmu(path: Path) -> FmuWalk:
 
 
 @lru_cache(maxsize=MAX_READ)
-def _read(path: Path, _changed: int, _size: int) -> FmuWalk:
-    """Returns the walk of a file with this stamp."""
+def _read(path: Path, _changed: int, _size: int) -> StanceAndGait:
+    """Returns those of a file with this stamp."""
     starts = {
         variable.name: variable.start
         for variable in open_description(path).modelVariables
@@ -195,7 +195,7 @@ def _read(path: Path, _changed: int, _size: int) -> FmuWalk:
     stance = None
     if len(angles) == len(NAMES):
         stance = tuple(zip(angles[0::3], angles[1::3], angles[2::3], strict=True))
-    return FmuWalk(stance, _gait(_numbers([starts.get(name) for name in TIMING])))
+    return StanceAndGait(stance, _gait(_numbers([starts.get(name) for name in TIMING])))
 
 
 def _gait(timing: tuple[float, ...]) -> dict[str, Any]:

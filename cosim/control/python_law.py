@@ -21,7 +21,8 @@ import numpy as np
 
 from hexapod_cosim.controller import BodyCommand, ControllerError, JointCommand, Measurement
 from hexapod_cosim.cosim.common.files import file_stamp
-from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, nearest_name
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, suggestion
+from hexapod_cosim.models.errors import nearest_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -48,16 +49,12 @@ def load_class(path: Path, name: str) -> type[Any]:
             for key, value in vars(module).items()
             if isinstance(value, type) and value.__module__ == module.__name__
         ]
-        near = nearest_name(name, classes)
+        otherwise = f"write path:{classes[0]}" if classes else "write the class"
         raise ControllerError(
             "no such class",
             got=name,
             expected=f"one of {', '.join(classes)}" if classes else "a class with the method step",
-            fix=f"did you mean {near!r}?"
-            if near
-            else f"write path:{classes[0]}"
-            if classes
-            else None,
+            fix=suggestion(name, classes, otherwise=otherwise),
             where=str(path),
         )
     return found
@@ -69,7 +66,12 @@ def _module(path: Path, _changed: int, _size: int) -> ModuleType:
     name = f"hexapod_law_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise ControllerError("not a Python file", got=str(path))
+        raise ControllerError(
+            "not a Python file",
+            got=str(path),
+            expected="a name that ends in .py",
+            fix="rename the file",
+        )
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     sys.path.insert(0, str(path.parent))

@@ -48,7 +48,7 @@ FIRST_STEP, LAST_STEP = 0.16, 0.01  # 1    of the depth of the ground: sizes of 
 
 
 @dataclass(frozen=True)
-class Walked:
+class StanceLoads:
     """Loads of a stance on one walk."""
 
     heat: float  # N2 m2    mean over the cycle of the sum of squared torques
@@ -72,7 +72,7 @@ def find_stance(robot: Robot, gait: Gait) -> StanceChange:
     and halves the size when there is none. Raises GainsError for a robot whose own stance does not
     reach the steps of its gait.
     """
-    before = walked(robot, gait)
+    before = stance_loads(robot, gait)
     if not np.isfinite(before.speed):
         raise GainsError(
             "the legs do not reach the steps of the gait",
@@ -93,7 +93,7 @@ def find_stance(robot: Robot, gait: Gait) -> StanceChange:
 
 
 def _best_neighbour(
-    robot: Robot, gait: Gait, place: StanceChange, size: float, before: Walked, heat: float
+    robot: Robot, gait: Gait, place: StanceChange, size: float, before: StanceLoads, heat: float
 ) -> tuple[StanceChange, float] | None:
     """Returns the allowed neighbour of least heat below `heat`, with its heat."""
     found = None
@@ -108,13 +108,13 @@ def _best_neighbour(
         torques, _ = _loads(moved, gait)
         if _heat(torques) >= heat:  # the other checks take longer
             continue
-        loads = walked(moved, gait)
+        loads = stance_loads(moved, gait)
         if _allowed(moved, gait, loads, before):
             found, heat = (there, loads.heat), loads.heat
     return found
 
 
-def _allowed(robot: Robot, gait: Gait, loads: Walked, before: Walked) -> bool:
+def _allowed(robot: Robot, gait: Gait, loads: StanceLoads, before: StanceLoads) -> bool:
     """Returns whether a stance is as firm, as slow and as free of its neighbours as required."""
     firm = min(FIRMNESS, before.firmness)
     fast = max(SPEED_SHARE * robot.servo.speed_max, before.speed)
@@ -141,11 +141,11 @@ def with_stance(robot: Robot, outward: float, deeper: float) -> Robot:
     return replace(robot, legs=changed)
 
 
-def walked(robot: Robot, gait: Gait) -> Walked:
+def stance_loads(robot: Robot, gait: Gait) -> StanceLoads:
     """Returns the loads of a robot's stance on a straight walk at its stride."""
     torques, firmness = _loads(robot, gait)
     squares = (torques * torques).mean(axis=0)
-    return Walked(
+    return StanceLoads(
         heat=_heat(torques),
         hottest=float(np.sqrt(squares.max())),
         firmness=firmness,
@@ -164,7 +164,7 @@ def _depth(robot: Robot) -> float:
 
 
 def _loads(robot: Robot, gait: Gait) -> tuple[Array, float]:
-    """Returns the servo torques (PHASES, 6, 3) [N m] and the least firmness (`Walked`)."""
+    """Returns the servo torques (PHASES, 6, 3) [N m] and the least firmness (`StanceLoads`)."""
     legs, needs = LegSolver(robot), requirements_for(robot)
     dynamics = InverseDynamics(robot, legs, period=1.0)  # the period is not used without motion
     timing = SupportGains(
@@ -228,7 +228,7 @@ def _gap(robot: Robot, gait: Gait) -> float:
 
 
 def _lifts(robot: Robot, gait: Gait) -> bool:
-    """Returns whether the joints can lift each foot anywhere on its way (`Walked`)."""
+    """Returns whether the joints can lift each foot anywhere on its way (`StanceLoads`)."""
     legs = LegSolver(robot)
     home, way = legs.forward(robot.stance), RESERVE * robot.gait.stride * gait.duty
     along = way * np.array([[-0.5], [0.0], [0.5]])

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import reduce
 
 from hexapod_cosim.cosim.interface.records import Causality, Interface, Variable
-from hexapod_cosim.models.errors import FmuError, nearest_name
+from hexapod_cosim.models.errors import FmuError, suggestion
 
 FNV_BASIS, FNV_PRIME, MASK, WORD = 0xCBF29CE484222325, 0x100000001B3, (1 << 64) - 1, 8
 SETTABLE: tuple[Causality, ...] = ("input", "parameter")
@@ -68,8 +68,8 @@ def _check(interface: Interface, name: str, value: float, driven: Collection[str
     component, variable = interface.component.name, interface.by_name.get(name)
     if variable is None or variable.causality not in SETTABLE or name in driven:
         free = [one.name for one in interface.of_causality(*SETTABLE) if one.name not in driven]
-        near = nearest_name(name, free)
-        fix = f"did you mean {near!r}?" if near else "name a parameter or an input without a source"
+        otherwise = "name a parameter or an input without a source"
+        fix = suggestion(name, free, otherwise=otherwise)
         raise FmuError(f"{component} has no such value to set", got=name, fix=fix)
     variable.check(value, FmuError, name=f"{component}.{name}")
 

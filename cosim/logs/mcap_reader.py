@@ -61,7 +61,12 @@ def read_mcap(path: Path, *, robot: Robot | None = None) -> Recording:
     except HexapodError:
         raise
     except FileNotFoundError as error:
-        raise HexapodError("no recording", got=error.strerror, where=str(path)) from error
+        raise HexapodError(
+            "no such recording",
+            got=str(path),
+            expected="an MCAP file",
+            fix="correct the path, or record one with `hexapod simulate --format mcap`",
+        ) from error
     except (OSError, McapError, *UNREADABLE) as error:
         raise HexapodError(
             "not an MCAP file of a robot",

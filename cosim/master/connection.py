@@ -23,7 +23,7 @@ from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.master.fmu_block import FmuVariable
 from hexapod_cosim.cosim.master.sensors import CONTACT, MEASURED, READINGS
 from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, COMMANDS, JOINT_COMMANDS
-from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError, nearest_name
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError, suggestion
 from hexapod_cosim.models.files import decoding_toml, parse_toml, read_text
 
 MOST_SHOWN = 12  # names in a message
@@ -165,12 +165,11 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _not_in_fmu(ours: str, theirs: str, present: Mapping[str, Any], where: str) -> FmuError:
-    near = nearest_name(theirs, present)
     return FmuError(
         f"the map names a variable that the FMU lacks, for {ours}",
         got=theirs,
         expected=f"one of its variables: {_listed(list(present))}",
-        fix=f"did you mean {near!r}?" if near else None,
+        fix=suggestion(theirs, present, otherwise="name one of these"),
         where=where,
     )
 
@@ -203,12 +202,11 @@ def names_of_map(table: Mapping[str, Any], *, where: str) -> dict[str, str]:
         found |= _expanded(ours, theirs)
     for name in found:
         if name not in OURS and name not in GROUPS:
-            near = nearest_name(name, [*OURS, *GROUPS])
             raise FmuError(
                 "not a name of a measurement, command or joint command",
                 got=name,
                 expected="a name as in the plant's FMU, or command.vx, ...",
-                fix=f"did you mean {near!r}?" if near else "see docs/howto/my-controller.md",
+                fix=suggestion(name, [*OURS, *GROUPS], otherwise="see docs/howto/my-controller.md"),
                 where=where,
             )
     return found

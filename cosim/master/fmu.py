@@ -28,7 +28,7 @@ from hexapod_cosim.cosim.master.fmu_block import (
     StepError,
     parameter_number,
 )
-from hexapod_cosim.models.errors import FmuError, nearest_name
+from hexapod_cosim.models.errors import FmuError, suggestion
 
 LAST_SUCCESSFUL_TIME = 2  # fmi2StatusKind
 
@@ -145,10 +145,7 @@ class Fmu(Closing):
         """
         references = self.references(names)
         kinds = {self.variables[name].type for name in names} or {"Real"}
-        if len(kinds) != 1:
-            raise FmuError(
-                "a block holds variables of one type", got=sorted(kinds), where=str(self.path)
-            )
+        assert len(kinds) == 1, f"a block of several types: {kinds}"
         return FmuBlock(self.bind, self.log, names, kinds.pop(), references, buffer)
 
     def parameters(self) -> dict[str, float]:
@@ -203,7 +200,10 @@ class Fmu(Closing):
                 raise FmuError(self.log.last_of(status), where=self.path.name)
             if status > WARNING:
                 raise FmuError(
-                    f"{name}: the FMU refuses the value", got=value, where=self.path.name
+                    f"{name}: the FMU refuses the value",
+                    got=value,
+                    fix="give one within the range that its modelDescription.xml states",
+                    where=self.path.name,
                 )
 
     def _parameter(self, name: str) -> Any:
@@ -222,8 +222,8 @@ class Fmu(Closing):
         return variable
 
     def _unknown(self, name: str, valid: Sequence[str] = ()) -> FmuError:
-        near = nearest_name(name, valid or self.variables)
-        fix = f"did you mean {near!r}?" if near else "`fmpy info` lists the names it has"
+        otherwise = "`fmpy info` lists the names it has"
+        fix = suggestion(name, valid or self.variables, otherwise=otherwise)
         return FmuError("the FMU has no such variable", got=name, fix=fix, where=str(self.path))
 
     def initialise(
@@ -248,7 +248,10 @@ class Fmu(Closing):
         except Exception as error:
             got = self.log.last(str(error))
             raise FmuError(
-                "the FMU cannot be initialised", got=got, where=str(self.path)
+                "the FMU cannot be initialised",
+                got=got,
+                fix="correct the parameters or the initial state that it names",
+                where=str(self.path),
             ) from error
 
     def reset(self) -> None:

@@ -47,15 +47,15 @@ FUNCTIONS = {  # members of hxStepFmu
     "set_reals": "fmi2SetReal",
     "do_step": "fmi2DoStep",
 }
-# hxStepCall, from 1: the FMU and the message; "" for a step, whose message is made by the FMU
-CALLS = (
-    ("plant", "the FMU does not give its outputs"),
-    ("plant", "the FMU does not take its inputs"),
-    ("plant", ""),
-    ("controller", "the FMU does not give its outputs"),
-    ("controller", "the FMU does not take its inputs"),
-    ("controller", ""),
-)
+# hxStepCall: the FMU and the message; "" for a step, whose message is made by the FMU
+CALLS = {
+    "HX_CALL_PLANT_GET": ("plant", "the FMU does not give its outputs"),
+    "HX_CALL_PLANT_SET": ("plant", "the FMU does not take its inputs"),
+    "HX_CALL_PLANT_STEP": ("plant", ""),
+    "HX_CALL_CONTROLLER_GET": ("controller", "the FMU does not give its outputs"),
+    "HX_CALL_CONTROLLER_SET": ("controller", "the FMU does not take its inputs"),
+    "HX_CALL_CONTROLLER_STEP": ("controller", ""),
+}
 
 
 def step_functions(fmu: Fmu, instance: int | None) -> Any:
@@ -276,7 +276,8 @@ class NativeMaster:
     def _error(self, t: float) -> FmuError:
         """Returns the error that ended the macro-step at t [s], worded as the Python master's."""
         stepper = self._master.stepper
-        which, what = CALLS[stepper.call - 1]
+        number = loop_header().constants
+        which, what = next(told for name, told in CALLS.items() if number[name] == stepper.call)
         fmu = self._fmus[which]
         return (
             fmu.log.failure(what, stepper.status) if what else fmu.step_failure(t, stepper.status)

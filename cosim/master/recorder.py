@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.interface.names import (
     vector_names,
 )
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.models import HexapodError, ScenarioError, nearest_name
+from hexapod_cosim.models import HexapodError, ScenarioError, suggestion
 
 Array = NDArray[np.float64]
 BLOCK_ROWS = 500  # that are stored at once
@@ -71,10 +71,8 @@ class Recording:
         """
         for name in names:
             if name not in self._index:
-                near = nearest_name(name, self.names)
-                fix = "record it: outputs.csv names the columns that are kept"
-                if near:
-                    fix = f"did you mean {near!r}?"
+                otherwise = "record it: outputs.csv names the columns that are kept"
+                fix = suggestion(name, self.names, otherwise=otherwise)
                 raise ColumnError("no such column in the recording", got=name, fix=fix)
         places = [self._index[name] for name in names]
         adjoin = bool(places) and places == list(range(places[0], places[0] + len(places)))
@@ -130,8 +128,7 @@ def chosen_columns(
     """
     for pattern in patterns:
         if not any(_matches(name, pattern) for name in names):
-            near = nearest_name(pattern, names)
-            fix = f"did you mean {near!r}?" if near else "`fmpy info` lists the names"
+            fix = suggestion(pattern, names, otherwise="`fmpy info` lists the names")
             raise ScenarioError("no output has this name", got=pattern, fix=fix, where=where)
     return [
         k

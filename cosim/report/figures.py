@@ -39,7 +39,7 @@ def draw_figures(views: Mapping[str, View], formats: Sequence[str] = ("svg",)) -
             try:
                 figure = draw(views)
             except ColumnError as error:
-                skipped[name] = f"{error.got} was not recorded"
+                skipped[name] = str(error)
                 continue
             place_axes(figure)
             images |= {f"{name}.{kind}": content for kind, content in figure_files(figure, formats)}

@@ -108,8 +108,8 @@ def locked(folder: Path) -> Iterator[None]:
     if release is None:
         raise HexapodError(
             "another process writes its results into this folder",
+            got=str(folder),
             fix="wait for it, or choose another with -o",
-            where=str(folder),
         )
     try:
         yield

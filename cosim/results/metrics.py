@@ -161,7 +161,7 @@ def _spread(window: JudgedWindow) -> Array:
     return np.broadcast_to(window.weights[:, None], (len(window.weights), len(LEG_NAMES)))
 
 
-def _percentiles(values: Array, weights: Array, wanted: tuple[float, ...]) -> list[float]:
+def percentiles(values: Array, weights: Array, wanted: tuple[float, ...]) -> list[float]:
     """Returns weighted percentiles; each value lies in the middle of its weight."""
     order = np.argsort(values, kind="stable")
     reached = np.cumsum(weights[order]) - 0.5 * weights[order]
@@ -234,7 +234,7 @@ def _force(window: JudgedWindow) -> dict[str, float]:
     peaks = window.whole.rows(window.steps()).feet("peak_force")
     return {
         "peak_force": float(peaks.max()) / window.weight,
-        "force_p95": _percentiles(normal[loaded], _spread(window)[loaded], (95.0,))[0]
+        "force_p95": percentiles(normal[loaded], _spread(window)[loaded], (95.0,))[0]
         if loaded.any()
         else np.nan,
         "loading_rate": float(np.percentile(rates, 95)) if len(rates) else np.nan,

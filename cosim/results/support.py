@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, TERRAINS
+from hexapod_cosim.models.kinematics import unit_rotation
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -114,13 +115,7 @@ def centre_of_mass(recording: Recording, parameters: Mapping[str, float]) -> Arr
 
 def rotation_matrices(quaternion: Array) -> Array:
     """Returns rotations from body to world (3, 3, rows) from quaternions (rows, 4) [w x y z]."""
-    w, x, y, z = np.ascontiguousarray(quaternion.T)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.array(rows)
+    return unit_rotation(*np.ascontiguousarray(quaternion.T))
 
 
 def feet_of_angles(part: Recording, parameters: Mapping[str, float]) -> Array:

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.controller import BodyCommand, Gains, GainsError, Gait, make_gait
-from hexapod_cosim.cosim.control.fmu_law import walk_of_fmu
+from hexapod_cosim.cosim.control.fmu_law import stance_and_gait
 from hexapod_cosim.cosim.design.stance import (
     SPEED_SHARE,
     Motion,
@@ -126,7 +126,7 @@ def compliant_gait(robot: Robot) -> GaitSelection:
 
 def _of_fmu(plain: GaitSelection, path: Path) -> GaitSelection:
     """Returns the walk with stance and gait of a controller FMU, as far as it has them."""
-    found = walk_of_fmu(path)
+    found = stance_and_gait(path)
     gait = make_gait(plain.robot, **found.gait) if found.gait else plain.gait
     own = replace(plain, gait=gait, chosen_by=BY_CONTROL if found.gait else OWN_CONTROLLER)
     if found.stance is None or np.array_equal(found.stance, plain.robot.stance):

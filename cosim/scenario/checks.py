@@ -20,7 +20,7 @@ from hexapod_cosim.cosim.scenario.records import (
     Variation,
 )
 from hexapod_cosim.cosim.scenario.sections import GAINS
-from hexapod_cosim.models import Robot, ScenarioError, load_robot, nearest_name
+from hexapod_cosim.models import Robot, ScenarioError, load_robot, suggestion
 from hexapod_cosim.models.ground.table import terrain_specs
 from hexapod_cosim.models.schema import specs
 
@@ -152,8 +152,8 @@ def _not_a_parameter(name: str, causality: str, where: str) -> ScenarioError:
 
 def _unknown(kind: str, name: str, valid: list[str], expected: str, *, where: str) -> ScenarioError:
     """Returns the error for an unknown name, as `unknown_name` but without the long list."""
-    near = nearest_name(name, valid)
-    fix = f"did you mean {near!r}?" if near else "the FMU's documentation lists the parameters"
+    otherwise = "the FMU's documentation lists the parameters"
+    fix = suggestion(name, valid, otherwise=otherwise)
     return ScenarioError(
         f"unknown {kind}", got=name, expected=f"{expected} of the FMU", fix=fix, where=where
     )

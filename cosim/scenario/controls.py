@@ -23,7 +23,7 @@ from typing import Any
 
 from hexapod_cosim.cosim.common.files import RESERVED_NAMES
 from hexapod_cosim.cosim.scenario.records import CHOSEN, CONTROLS, OWN
-from hexapod_cosim.models import ScenarioError, nearest_name
+from hexapod_cosim.models import ScenarioError, suggestion
 from hexapod_cosim.models.errors import refuse_path
 
 BUILTIN, PYTHON, FMU = "builtin", "python", "fmu"
@@ -164,8 +164,7 @@ def _named(text: str, *, where: str, base: Path | None) -> tuple[str, str, Path 
             where=where,
         )  # fmt: skip
     if text not in CONTROLS:
-        near = nearest_name(text, CONTROLS)
-        fix = f"did you mean {near!r}?" if near else "name a class as law.py:Class"
+        fix = suggestion(text, CONTROLS, otherwise="name a class as law.py:Class")
         walks = " or ".join(f"{AT}{walk}" for walk in WALKS)
         expected = f"one of {', '.join(CONTROLS)}, or law.py:Class, with {walks} or without, "
         expected += "or controller.fmu"

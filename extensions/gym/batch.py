@@ -246,7 +246,12 @@ class Batch(Closing):
                 return
             numbers = None
         failed = int(np.flatnonzero(starting)[0])
-        raise FmuError(f"environment {failed} cannot start", got=self.message(failed))
+        raise FmuError(
+            f"environment {failed} cannot start",
+            got=self.message(failed),
+            expected=f"one start in {STARTS} episodes",
+            fix="narrow the ranges from which parameters are drawn",
+        )
 
     def step(self) -> None:
         """Steps all environments under `action`.
@@ -286,7 +291,9 @@ class Batch(Closing):
 
     def _handle(self) -> int:
         if self._owned.handle is None:
-            raise HexapodError("the environments are closed", fix="create new ones")
+            raise HexapodError(
+                "the environments are closed", got="a call after close()", fix="create new ones"
+            )
         return self._owned.handle
 
     def close(self) -> None:

@@ -18,7 +18,7 @@ import tomlkit.items
 from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.extensions.identify.identification import Estimate, Identified
 from hexapod_cosim.extensions.identify.unknowns import OF_FILE
-from hexapod_cosim.models import JOINT_NAMES, HexapodError, Robot, load_robot
+from hexapod_cosim.models import JOINT_NAMES, Robot, load_robot
 from hexapod_cosim.models.robot import robot_path
 
 SECTIONS = ("servo", "contact", "friction")
@@ -35,10 +35,10 @@ def robot_text(found: Identified, file: str, folder: Path, logs: Sequence[str]) 
         folder: where the new file will stand; a URDF is named relative to it.
         logs: the names of the logs.
 
-    Raises HexapodError when the file cannot be read again.
+    Raises RobotError when the file cannot be read again.
     """
-    path = robot_path(file)
-    document = _document(path, folder)
+    before, after = load_robot(file), found.robot
+    document = _document(robot_path(file), folder)
     document["name"] = f"{found.robot.name}-identified"
     source = document.setdefault("source", tomlkit.table())
     names = " ".join(Path(log).name for log in logs)
@@ -46,7 +46,6 @@ def robot_text(found: Identified, file: str, folder: Path, logs: Sequence[str]) 
     own = [one for one in found.estimates if one.group in OF_FILE]
     for one in own:
         source[one.key] = _sentence(one, names)
-    before, after = load_robot(file), found.robot
     for name in SECTIONS:
         _set_changed(document, name, getattr(before, name), getattr(after, name))
     _set_bodies(document, before, after)
@@ -55,18 +54,12 @@ def robot_text(found: Identified, file: str, folder: Path, logs: Sequence[str]) 
 
 
 def _document(path: Path, folder: Path) -> Any:
-    """Returns the tables of a robot file, to be changed; paths in it are made right for `folder`.
-
-    Raises HexapodError for a file that cannot be read.
-    """
-    try:
-        if path.suffix.lower() == ".urdf":
-            document = tomlkit.document()
-            document["urdf"] = {"file": _relative(path, folder)}
-            return document
-        document = tomlkit.parse(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise HexapodError("cannot read", got=error.strerror, where=str(path)) from error
+    """Returns the tables of a robot file, to be changed, with its paths right for `folder`."""
+    if path.suffix.lower() == ".urdf":
+        document = tomlkit.document()
+        document["urdf"] = {"file": _relative(path, folder)}
+        return document
+    document = tomlkit.parse(path.read_text(encoding="utf-8"))
     for section in ("urdf", "terrain"):
         table: Any = document.get(section, {})
         if "file" in table:

@@ -105,8 +105,12 @@ def _connect(address: str) -> Any:
     try:
         from distributed import Client  # noqa: PLC0415  an extra
     except ImportError as error:
-        what, fix = "Dask is not installed", install_extra("cluster")
-        raise StudyError(what, fix=fix, where="--scheduler") from error
+        raise StudyError(
+            "Dask is not installed",
+            expected="the extra `cluster`",
+            fix=install_extra("cluster"),
+            where="--scheduler",
+        ) from error
     try:
         if "://" not in address:
             raise ValueError

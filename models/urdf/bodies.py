@@ -25,8 +25,8 @@ class Member:
 
     def moved(self, part: Inertial) -> Inertial:
         """Returns the link's mass, centre of mass and inertia in the body's frame."""
-        R = self.rotation
-        return Inertial(part.mass, self.point(part.com), R @ part.inertia @ R.T)
+        R_BL = self.rotation
+        return Inertial(part.mass, self.point(part.com), R_BL @ part.inertia @ R_BL.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,9 +145,9 @@ def _collect(body: Body, urdf: Urdf, leaving: dict[str, list[UrdfJoint]]) -> Non
             if joint.kind == "floating":
                 what, fix = "a link that floats", "only the torso may float: make it fixed"
                 raise RobotError(what, got=joint.child, expected="joints", fix=fix, where=where)
-            R, p = member.rotation @ joint.rotation, member.point(joint.position)
+            R_BL, p_B = member.rotation @ joint.rotation, member.point(joint.position)
             if joint.kind == "fixed":
-                waiting.append(Member(urdf.links[joint.child], R, p))
+                waiting.append(Member(urdf.links[joint.child], R_BL, p_B))
             else:
                 direct = member is body.members[0]
-                body.branches.append(Branch(joint, R, p, direct, Body(joint.child)))
+                body.branches.append(Branch(joint, R_BL, p_B, direct, Body(joint.child)))

@@ -121,13 +121,13 @@ def _link(element: ET.Element, where: str, ignored: Counter[str]) -> UrdfLink:
     for tag in ("collision", "visual"):
         for shape in element.findall(tag):
             at = f"{where}: {tag}"
-            R, p, _ = origin(shape, at)
+            R_LO, p_L, _ = origin(shape, at)
             for geometry in shape.findall("geometry/*"):
                 ignored["mesh"] += geometry.tag == "mesh"
                 if geometry.tag == "box":
-                    boxes.append(np.abs(R) @ numbers(geometry, "size", None, at))
+                    boxes.append(np.abs(R_LO) @ numbers(geometry, "size", None, at))
                 if tag == "collision" and geometry.tag == "sphere":
-                    spheres.append(Sphere(p, number(geometry, "radius", None, at)))
+                    spheres.append(Sphere(p_L, number(geometry, "radius", None, at)))
     box = boxes[0] if boxes else None
     return UrdfLink(element.get("name", ""), _inertial(element, where), tuple(spheres), box)
 
@@ -141,12 +141,12 @@ def _inertial(link: ET.Element, where: str) -> Inertial | None:
     mass = number(element.find("mass"), "value", None, at)
     if mass < 0.0:
         raise RobotError("negative mass", got=mass, expected=">= 0 kg", fix="correct it", where=at)
-    R, p, _ = origin(element, at)
+    R_LO, p_L, _ = origin(element, at)
     table = element.find("inertia")
     moments = [number(table, key, None, at) for key in ("ixx", "iyy", "izz")]
     products = [number(table, key, 0.0, at) for key in ("ixy", "ixz", "iyz")]
     inertia = inertia_matrix((*moments, *products))
-    return Inertial(mass, p, R @ inertia @ R.T + 0.0) if mass > 0.0 else None
+    return Inertial(mass, p_L, R_LO @ inertia @ R_LO.T + 0.0) if mass > 0.0 else None
 
 
 def _joint(element: ET.Element, where: str, ignored: Counter[str]) -> UrdfJoint:
@@ -159,7 +159,7 @@ def _joint(element: ET.Element, where: str, ignored: Counter[str]) -> UrdfJoint:
         what, got = "a joint that follows another", f"mimics {mimic.get('joint')!r}"
         fix, expected = "remove <mimic>", "joints with motors of their own"
         raise RobotError(what, got=got, expected=expected, fix=fix, where=where)
-    R, p, angles = origin(element, where)
+    R_PL, p_P, angles = origin(element, where)
     dynamics = element.find("dynamics")
     limit, (lower, upper) = element.find("limit"), _limits(element, kind, where, ignored)
     return UrdfJoint(
@@ -167,8 +167,8 @@ def _joint(element: ET.Element, where: str, ignored: Counter[str]) -> UrdfJoint:
         kind=kind,
         parent=_end(element, "parent", where),
         child=_end(element, "child", where),
-        rotation=R,
-        position=p,
+        rotation=R_PL,
+        position=p_P,
         yaw=angles[2] if angles[:2] == [0.0, 0.0] else None,
         axis=_axis(element, where) if moves else np.zeros(3),
         lower=lower,

@@ -132,12 +132,12 @@ def _leg(
     ]
     table: dict[str, Any] = {"hip_position": hip.tolist(), "hip_yaw": yaw}
     other_way = []
-    for joint, pattern, branch, R, tip in zip(
+    for joint, pattern, branch, R_HB, tip in zip(
         JOINT_NAMES, PATTERN, chain, turns, tips, strict=True
     ):
-        axis, sign = _axis(R @ branch.joint.axis, pattern if wanted is not None else None)
+        axis, sign = _axis(R_HB @ branch.joint.axis, pattern if wanted is not None else None)
         other_way += [branch.joint.name] if sign < 0.0 else []
-        table[joint] = _link(branch, R, tip, axis, sign, where)
+        table[joint] = _link(branch, R_HB, tip, axis, sign, where)
     names = tuple(branch.joint.name for branch in chain)
     return FoundLeg(name, table, names, tuple(other_way), radius, foot, chain)
 
@@ -148,7 +148,7 @@ def _pattern_yaw(
     """Returns the hip's yaw [rad] at which the axes equal the controller's up to their signs, or
     None.
     """
-    coxa, femur, tibia = (R @ branch.joint.axis for R, branch in zip(turns, chain, strict=True))
+    coxa, femur, tibia = (R_TB @ one.joint.axis for R_TB, one in zip(turns, chain, strict=True))
     if np.hypot(*coxa[:2]) > PATTERN_TOLERANCE or abs(femur[2]) > PATTERN_TOLERANCE:
         return None
     if np.linalg.norm(cross(femur, tibia)) > PATTERN_TOLERANCE:
@@ -197,7 +197,7 @@ def foot_of(tibia: Body) -> tuple[Array | None, float | None]:
 
 
 def _link(
-    branch: Branch, R: Array, tip: Array | None, axis: Array, sign: float, where: str
+    branch: Branch, R_HB: Array, tip: Array | None, axis: Array, sign: float, where: str
 ) -> dict[str, Any]:
     """Returns a link's table, in hip axes."""
     inertial, joint = branch.body.inertial(where), branch.joint
@@ -207,8 +207,8 @@ def _link(
     return {
         "mass": inertial.mass,
         **place,
-        "com": (R @ inertial.com).tolist(),
-        "inertia": inertia_entries(R @ inertial.inertia @ R.T),
+        "com": (R_HB @ inertial.com).tolist(),
+        "inertia": inertia_entries(R_HB @ inertial.inertia @ R_HB.T),
         "axis": axis.tolist(),
         "angle_min": limits[0],
         "angle_max": limits[1],

@@ -168,7 +168,7 @@ def test_an_unexpected_error_is_one_line_with_a_hint(
     def burst(*_: object, **__: object) -> None:
         raise ZeroDivisionError("by nought")
 
-    monkeypatch.setattr("hexapod_cosim.cosim.cli.simulation.load_scenario", burst)
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.scenario_runs.load_scenario", burst)
     assert_refused(call("simulate"), "unexpected ZeroDivisionError: by nought", "--debug")
     with pytest.raises(ZeroDivisionError):
         main(["--debug", "simulate"])
@@ -246,7 +246,7 @@ def test_with_json_an_interrupt_is_an_object_too(
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hexapod_cosim.cosim.cli.simulation.load_scenario", interrupted)
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.scenario_runs.load_scenario", interrupted)
     code, out, err = call("simulate", "--json")
     assert (code, err) == (130, "hexapod: interrupted\n")
     assert json.loads(out)["exit_code"] == 130

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from command import Call
 
-from hexapod_cosim.cosim.control.fmu_law import walk_of_fmu
+from hexapod_cosim.cosim.control.fmu_law import stance_and_gait
 from hexapod_cosim.cosim.export.plant import export_controller
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.connection import connect, names_of_map, read_map
@@ -190,7 +190,7 @@ def test_the_plant_is_exported_in_the_same_stance(
     controller = exported(
         call, tmp_path / "c.fmu", "--controller", "compliant", "--stance", "chosen"
     )
-    stance = np.array(walk_of_fmu(controller).stance)
+    stance = np.array(stance_and_gait(controller).stance)
     own = np.array(load_robot("athena").stance)
     assert np.abs(stance - own).max() > 0.05  # rad
     with Fmu(exported(call, tmp_path / "p.fmu", "--stance", "chosen")) as plant:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import astuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -211,9 +212,21 @@ def test_a_ramp_is_smooth_and_ends_on_its_target_exactly() -> None:
     assert ramp.settled()
 
 
-def test_a_command_that_is_not_a_number_is_refused() -> None:
-    with pytest.raises(HexapodError, match="impossible body command"):
-        CommandRamp(1.0, period=PERIOD).aim(BodyCommand(vy=float("nan")))
+@pytest.mark.parametrize("name", ["vx", "vy", "yaw_rate", "height", "roll", "pitch"])
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("fast", "wrong type of an argument: got 'fast'"),
+        (None, "wrong type of an argument: got 'nothing (None)'"),
+        (1j, "wrong type of an argument: got 1j"),
+        (float("nan"), "impossible body command: got nan"),
+        (float("-inf"), "impossible body command: got -inf"),
+    ],
+)
+def test_a_command_that_is_not_a_finite_number_is_refused(name: str, value: Any, said: str) -> None:
+    with pytest.raises(HexapodError) as refused:
+        BodyCommand(**{name: value})
+    assert str(refused.value).startswith(f"{name}: {said}, expected a finite number; ")
 
 
 def test_while_the_clock_is_held_no_foot_moves_over_the_ground_and_then_it_continues() -> None:

@@ -17,7 +17,7 @@ from hexapod_cosim.controller.design import StandingPlant, design_gains
 from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.cosim.design.gains import STANCES, design_for, examine_stances, level_fmu
 from hexapod_cosim.cosim.design.linearise import Bench
-from hexapod_cosim.cosim.design.stance import Walked, find_stance, walked, with_stance
+from hexapod_cosim.cosim.design.stance import StanceLoads, find_stance, stance_loads, with_stance
 from hexapod_cosim.cosim.design.standing import lifted_stance, loads, rest
 from hexapod_cosim.models import Robot, load_robot
 
@@ -211,16 +211,16 @@ ATHENA = load_robot("athena")
 
 
 @cache
-def found() -> Walked:
+def found() -> StanceLoads:
     """The loads in the stance of least heat."""
     change = find_stance(ATHENA, make_gait(ATHENA))
     assert change.outward == pytest.approx(-0.05265)
     assert change.deeper == pytest.approx(0.0189)
-    return walked(with_stance(ATHENA, *change), make_gait(ATHENA))
+    return stance_loads(with_stance(ATHENA, *change), make_gait(ATHENA))
 
 
 def test_the_stance_of_least_heat_brings_the_feet_nearer_to_the_hips() -> None:
-    before = walked(ATHENA, make_gait(ATHENA))
+    before = stance_loads(ATHENA, make_gait(ATHENA))
     assert found().heat < 0.8 * before.heat
     assert found().hottest < ATHENA.servo.torque_continuous < before.hottest
 

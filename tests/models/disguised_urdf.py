@@ -149,21 +149,11 @@ def _disguised_leg(root: ET.Element, number: int, robot: Robot, rng: np.random.G
         limit.set("velocity", repr(robot.servo.speed_max))
         ET.SubElement(element, "dynamics", friction=repr(robot.servo.coulomb_friction))
         parent, R_above, place = name, R, R_hip @ np.array(link.tip)
-    foot = ET.SubElement(root, "link", name=f"l{number}foot")
-    ET.SubElement(
-        ET.SubElement(ET.SubElement(foot, "collision"), "geometry"),
-        "sphere",
-        radius=repr(robot.foot.radius),
-    )
-    _joint(
-        root,
-        f"l{number}foot_joint",
-        parent,
-        f"l{number}foot",
-        "fixed",
-        R_above.T @ place,
-        np.eye(3),
-    )
+    name = f"l{number}foot"
+    foot = ET.SubElement(root, "link", name=name)
+    geometry = ET.SubElement(ET.SubElement(foot, "collision"), "geometry")
+    ET.SubElement(geometry, "sphere", radius=repr(robot.foot.radius))
+    _joint(root, f"{name}_joint", parent, name, "fixed", R_above.T @ place, np.eye(3))
 
 
 def stances(robot: Robot) -> str:

@@ -13,7 +13,7 @@ import pytest
 from disguised_urdf import random_robot
 from foreign_urdf import spider_urdf
 
-from hexapod_cosim.cosim.cli.exports import FORMATS, export_description
+from hexapod_cosim.cosim.cli.exported_files import FORMATS, export_description
 from hexapod_cosim.models import LEG_NAMES, Robot, foot_positions, list_robots, load_robot
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.dynamics import mass_matrix, masses

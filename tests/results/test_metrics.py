@@ -13,7 +13,7 @@ from hexapod_cosim.cosim.interface.names import foot_names, joint_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.report.tables import metric_rows, number
 from hexapod_cosim.cosim.results.metric_table import METRICS
-from hexapod_cosim.cosim.results.metrics import compute_metrics
+from hexapod_cosim.cosim.results.metrics import compute_metrics, percentiles
 from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
@@ -52,6 +52,14 @@ def test_the_metrics_are_those_of_the_contract_with_slip_after_what_is_exactly_m
         "realtime_factor",
     ]
     assert list(SyntheticRun().metrics()) == list(METRICS)
+
+
+def test_a_value_of_a_weighted_percentile_lies_in_the_middle_of_its_weight() -> None:
+    """In order 1, 2 and 3 weigh 1, 1 and 2: their middles are at 0.5, 1.5 and 3 of 4."""
+    values, weights = np.array([3.0, 1.0, 2.0]), np.array([2.0, 1.0, 1.0])
+    # at 0.4, 0.5, 1, 2, 2.4 and 3.8
+    found = percentiles(values, weights, (10.0, 12.5, 25.0, 50.0, 60.0, 95.0))
+    assert found == pytest.approx([1.0, 1.0, 1.5, 7.0 / 3.0, 2.6, 3.0], rel=1e-12)
 
 
 def test_forces_are_in_body_weights_and_the_percentile_is_of_loaded_feet() -> None:

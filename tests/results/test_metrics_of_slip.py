@@ -140,6 +140,23 @@ def test_cone_use_is_told_by_percentiles_over_time(
     assert metrics["cone_use_over_90"] == 0.0
 
 
+@pytest.mark.parametrize(
+    ("share", "p50", "p95"),
+    [
+        (0.0005, 0.00025, 0.0009025),  # from 0 to 0.9 (1/30)^2: 0.9 (0.5/30)^2, 0.9 (0.95/30)^2
+        (0.15, 0.15625, 0.1677025),  # from 0.144 to 0.169: 0.9 (12.5/30)^2, 0.9 (12.95/30)^2
+    ],
+)
+def test_within_a_bin_of_the_cone_time_is_even_over_the_root_of_the_share(
+    share: float, p50: float, p95: float
+) -> None:
+    walk = SyntheticRun()
+    use_cone(walk, share)
+    metrics = walk.metrics(friction__mu=0.7)
+    assert metrics["cone_use_p50"] == pytest.approx(p50, rel=1e-12)
+    assert metrics["cone_use_p95"] == pytest.approx(p95, rel=1e-12)
+
+
 @pytest.mark.parametrize(("load", "counts"), [(0.0095, False), (0.0105, True)])
 def test_a_foot_stands_on_a_hundredth_of_the_weight(load: float, counts: bool) -> None:
     walk = SyntheticRun()

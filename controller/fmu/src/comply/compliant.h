@@ -99,9 +99,9 @@ static inline void hx_compliant_compile(const hxControllerDefinition *definition
   const hxNeighbours motion = {{NULL, &masses, NULL}, {NULL, pose, NULL}};
   hx_inverse_dynamics_demand(&model->dynamics, leg, &motion, still, &level, 1.0, &rest);
   hx_support_compile(definition, &rest, &model->support);
-  hx_force_laws_compile(definition, -model->dynamics.floor, &model->laws);
-  hx_planned_squeeze_compile(definition, model->laws.weight, -model->dynamics.floor,
-                             &model->squeeze);
+  const double weight = model->dynamics.total_mass * model->dynamics.gravity;
+  hx_force_laws_compile(definition, weight, -model->dynamics.floor, &model->laws);
+  hx_planned_squeeze_compile(definition, weight, -model->dynamics.floor, &model->squeeze);
   hx_hold_compile(definition, &model->hold);
   const hxParts *parts = &definition->parts;
   hx_load_adaptation_compile(definition, parts->support ? parts->squeeze : 0.0,

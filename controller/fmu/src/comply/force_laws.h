@@ -70,22 +70,14 @@ enum {
   HX_TRIPOD_LEGS = 3
 }; /* legs that share the weight in the hardest gait: loads are counted in weight / 3 */
 
-static inline double total_weight(const hxControllerDefinition *d) {
-  double mass = d->torso.mass;
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    for (int joint = 0; joint < HX_JOINTS; ++joint) mass += d->leg[leg].link[joint].mass;
-  return mass * sqrt(d->gravity[0] * d->gravity[0] + d->gravity[1] * d->gravity[1] +
-                     d->gravity[2] * d->gravity[2]);
-}
-
-/* depth: of the ground below the torso's origin in the stance [m]. */
-static inline void hx_force_laws_compile(const hxControllerDefinition *definition, double depth,
-                                         hxForceLawsModel *model) {
+/* weight: of the robot [N]; depth: of the ground below the torso's origin in the stance [m]. */
+static inline void hx_force_laws_compile(const hxControllerDefinition *definition, double weight,
+                                         double depth, hxForceLawsModel *model) {
   const hxGains *gains = &definition->gains;
   const double period = definition->period, cycle = definition->gait.period;
   model->parts = definition->parts;
   model->period = period;
-  model->weight = total_weight(definition);
+  model->weight = weight;
   model->share = model->weight / HX_TRIPOD_LEGS;
   model->settled = settled_share * model->weight;
   model->most_lean = largest_lean * depth;

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "hexapod/message.h"
+#include "hexapod/torso_axes.h"
 
 static const double two_pi = 6.283185307179586;
 
@@ -149,23 +150,13 @@ void hx_environment_reset(hxEnvironment *environment) {
 /* ----------------------------------------------------------------------------------------------
  * motion in axes of the torso */
 
-/* Computes R^T u, with the rotation R of the quaternion [w x y z], torso to world. */
-static void to_torso(const double p[4], const double u[3], double v[3]) {
-  const double w = p[0], *q = p + 1;
-  const double c[3] = {u[1] * q[2] - u[2] * q[1], u[2] * q[0] - u[0] * q[2],
-                       u[0] * q[1] - u[1] * q[0]}; /* u x q */
-  const double d[3] = {c[1] * q[2] - c[2] * q[1], c[2] * q[0] - c[0] * q[2],
-                       c[0] * q[1] - c[1] * q[0]}; /* (u x q) x q */
-  for (int i = 0; i < 3; ++i) v[i] = u[i] + 2.0 * (w * c[i] + d[i]);
-}
-
 static hxEnvView view_of(const hxEnvironment *environment) {
   static const double down[3] = {0.0, 0.0, -1.0};
   const double *value = environment->value, *p = value + HX_ENV_QUATERNION;
   hxEnvView view;
-  to_torso(p, value + HX_ENV_VELOCITY, view.velocity);
-  to_torso(p, value + HX_ENV_ROTATION, view.rotation);
-  to_torso(p, down, view.gravity);
+  hx_torso_axes(p, value + HX_ENV_VELOCITY, view.velocity);
+  hx_torso_axes(p, value + HX_ENV_ROTATION, view.rotation);
+  hx_torso_axes(p, down, view.gravity);
   return view;
 }
 

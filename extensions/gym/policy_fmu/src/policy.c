@@ -7,6 +7,7 @@
 
 #include "hexapod/message.h"
 #include "hexapod/range_check.h"
+#include "hexapod/torso_axes.h"
 
 /* Consists of doubles and one integer of 64 bits, without padding. */
 typedef struct hxPolicyState {
@@ -73,24 +74,14 @@ static hxStatus check_input(const hxPolicyInput *input, char *message) {
 /* ----------------------------------------------------------------------------------------------
  * action */
 
-/* Computes R^T u, with the rotation R of the quaternion [w x y z], torso to world. */
-static void to_torso_axes(const double p[4], const double u[3], double v[3]) {
-  const double w = p[0], *q = p + 1;
-  const double c[3] = {u[1] * q[2] - u[2] * q[1], u[2] * q[0] - u[0] * q[2],
-                       u[0] * q[1] - u[1] * q[0]}; /* u x q */
-  const double d[3] = {c[1] * q[2] - c[2] * q[1], c[2] * q[0] - c[0] * q[2],
-                       c[0] * q[1] - c[1] * q[0]}; /* (u x q) x q */
-  for (int i = 0; i < 3; ++i) v[i] = u[i] + 2.0 * (w * c[i] + d[i]);
-}
-
 /* Computes the observation. */
 static void observe(const hxPolicyDefinition *definition, const hxPolicyInput *input, double time,
                     double x[HX_POLICY_SEEN]) {
   static const double down[3] = {0.0, 0.0, -1.0};
   const double turns = definition->clock * time, phase = two_pi * (turns - floor(turns));
   double *to = x + 9;
-  to_torso_axes(input->quaternion, input->rotation, x);
-  to_torso_axes(input->quaternion, down, x + 3);
+  hx_torso_axes(input->quaternion, input->rotation, x);
+  hx_torso_axes(input->quaternion, down, x + 3);
   for (int i = 0; i < 3; ++i) x[i] *= 0.25;
   x[6] = 10.0 * input->command.vx;
   x[7] = 10.0 * input->command.vy;

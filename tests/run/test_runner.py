@@ -23,7 +23,8 @@ from hexapod_cosim.cosim.master.loop import (
     diagnostic_columns,
     run,
 )
-from hexapod_cosim.cosim.master.native_loop import NativeMaster
+from hexapod_cosim.cosim.master.loop_library import loop_header
+from hexapod_cosim.cosim.master.native_loop import CALLS, NativeMaster
 from hexapod_cosim.cosim.master.recorder import Recorder
 from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
@@ -279,3 +280,10 @@ def test_memory_does_not_grow_with_the_number_of_runs(runner: Runner) -> None:
     for plan in plans:
         runner.summary(plan, gains=gains)
     assert resident() - before < GROWTH
+
+
+def test_each_call_that_can_fail_in_c_has_a_message() -> None:
+    named = [name for name in loop_header().constants if name.startswith("HX_CALL_")]
+    assert named == ["HX_CALL_NONE", *CALLS]
+    told = {name: name.split("_")[2].lower() for name in CALLS}
+    assert told == {name: fmu for name, (fmu, _) in CALLS.items()}
