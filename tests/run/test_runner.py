@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gains import make_gains
+from gains import gains_of
 from memory import resident
 
-from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.control.fmu_law import law_of_ours
 from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.master.fmu import Fmu
@@ -23,7 +22,8 @@ from hexapod_cosim.cosim.master.loop import (
     diagnostic_columns,
     run,
 )
-from hexapod_cosim.cosim.master.native_loop import NativeMaster
+from hexapod_cosim.cosim.master.loop_library import loop_header
+from hexapod_cosim.cosim.master.native_loop import CALLS, NativeMaster
 from hexapod_cosim.cosim.master.recorder import Recorder
 from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.master.signals import Signals
@@ -64,14 +64,6 @@ pytestmark = pytest.mark.usefixtures("plant_build")
 def planned(name: str, *changes: str, seed: int | None = None) -> Scenario:
     scenario = load_scenario(name, overrides=["duration=2.5", "gait.period=0.6", *changes])
     return scenario if seed is None else replace(scenario, seed=seed, variation=STANDARD)
-
-
-def gains_of(scenario: Scenario) -> Gains | None:
-    return (
-        None
-        if scenario.control == "kinematic"
-        else make_gains(load_robot(scenario.robot), period=scenario.macro_step)
-    )
 
 
 def in_python(scenario: Scenario, runner: Runner) -> tuple[Outcome, Result]:
@@ -279,3 +271,10 @@ def test_memory_does_not_grow_with_the_number_of_runs(runner: Runner) -> None:
     for plan in plans:
         runner.summary(plan, gains=gains)
     assert resident() - before < GROWTH
+
+
+def test_each_call_that_can_fail_in_c_has_a_message() -> None:
+    named = [name for name in loop_header().constants if name.startswith("HX_CALL_")]
+    assert named == ["HX_CALL_NONE", *CALLS]
+    told = {name: name.split("_")[2].lower() for name in CALLS}
+    assert told == {name: fmu for name, (fmu, _) in CALLS.items()}
