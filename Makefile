@@ -30,7 +30,7 @@ SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_e
 
 .PHONY: help help-extensions setup demo test test-docs test-browser test-importers test-platforms \
 	test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short \
-	test-robots test-extensions \
+	test-robots test-extensions test-extensions-short \
 	test-wheels test-metadata wheels test-compilers fuzz fuzz-short lint-c check bench \
 	bench-quick format generate \
 	fmu typing clean docs docs-computed bench-waiting coverage lock audit
@@ -47,7 +47,8 @@ help:
 	@echo "make test-native   the tests that are programs in C, run by ctest (1 min)"
 	@echo "make test-sanitize   these, the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
 	@echo "make test-sanitize-short  the same without random calls and many instances (2 min)"
-	@echo "make test-extensions  each extension deleted in turn: the rest is installed anew and passes its tests (an hour)"
+	@echo "make test-extensions  each extension deleted in turn, then all: the rest is installed and passes its tests (an hour)"
+	@echo "make test-extensions-short  all extensions deleted: the core passes the tests of commands and docs (3 min)"
 	@echo "make test-robots  30 robots drawn at random, 0.5 to 30 kg: all designed for, all walk (3 min)"
 	@echo "make wheels    wheels for Linux, Windows and macOS, source distribution and SHA-256 list in dist/ (3 min)"
 	@echo "make test-wheels  these: sizes, tags, and the Linux wheel in an empty environment without a compiler (3 min)"
@@ -128,6 +129,9 @@ test-compilers: setup
 # each extension deleted in turn: installs the rest anew and runs its tests
 test-extensions: setup
 	HEXAPOD_EXTENSIONS=all $(BIN)/python -m pytest -q tests/docs/test_extensions.py
+
+test-extensions-short: setup
+	HEXAPOD_EXTENSIONS=short $(BIN)/python -m pytest -q tests/docs/test_extensions.py
 
 test-robots: setup
 	HEXAPOD_ROBOTS=all $(BIN)/python -m pytest -q -s tests/design/test_random_robots.py

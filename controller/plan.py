@@ -89,8 +89,7 @@ class WalkPlan(Stateful):
     def aim(self, command: BodyCommand) -> bool:
         """Leads the body to a command, as far as the joints can follow it (C59).
 
-        Returns whether the plan no longer applies. Raises HexapodError for a number that is not
-        finite.
+        Returns whether the plan no longer applies. Raises HexapodError for no BodyCommand.
         """
         return command != self.pace.asked and self._set_pace(command)
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 from building import PACKED, BuildError, built, shared_library
-from command import Call
+from command import QUICK, Call
 from fmi3_plant import Plant3
 from fmi_plant import Plant
 from xdist.scheduler import LoadScopeScheduling
@@ -152,6 +152,15 @@ def controller_core(plant_build: Path) -> ctypes.CDLL:
     return ctypes.CDLL(
         str(shared_library(plant_build, "controller/fmu", "libhexapod_controller_c"))
     )
+
+
+@pytest.fixture(scope="session")
+def recorded(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of a short walk under kinematic control, as MCAP and Parquet."""
+    folder = tmp_path_factory.mktemp("walked") / "out"
+    formats = ("--format", "mcap", "--format", "parquet")
+    assert main(["simulate", "walk_flat", "-o", str(folder), *formats, *QUICK]) == 0
+    return folder
 
 
 @pytest.fixture

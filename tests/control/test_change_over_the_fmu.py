@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from controller_fmus import outputs
 
 from hexapod_cosim.controller import make_gait
 from hexapod_cosim.cosim.export.plant import export_controller
@@ -65,13 +66,6 @@ def begin(fmu: Fmu) -> None:
 def go(fmu: Fmu, first: int, end: int) -> None:
     for k in range(first, end):
         fmu.step(k * STEP, STEP)
-
-
-def outputs(fmu: Fmu) -> np.ndarray:
-    """Returns all Real outputs."""
-    block = fmu.block(fmu.names("output"))
-    block.get()
-    return block.values.copy()
 
 
 def state_of(fmu: Fmu) -> bytes:

@@ -75,20 +75,25 @@ def shown_at(plant: Plant, name: str, value: float, x: Array) -> Array:
     return shown
 
 
-@pytest.mark.parametrize("name", PARAMETERS)
-def test_derivatives_by_parameters_are_the_limits_of_differences(
-    plant_library: Path, name: str
-) -> None:
-    plant = walking(plant_library)
+def limits_of_differences(plant: Plant, name: str, share: float) -> tuple[Array, Array]:
+    """Compares the derivatives by a number with differences over a share of it; returns both."""
     x, value = fetched(plant, "fmi2GetContinuousStates", len(STATES)), plant.real(name)
     status, exact = directional(plant, SHOWN, [name], [1.0])
     assert status == OK, plant.last_message
-    h = 1e-4 * (abs(value) or 1.0)
+    h = share * (abs(value) or 1.0)
     ends = [shown_at(plant, name, value + sign * h, x) for sign in (1.0, -1.0)]
     found = (ends[0] - ends[1]) / (2.0 * h)
     size = np.abs(ends[0]) / (abs(value) or 1.0) * 1e-6 + np.abs(found).max() * DIFFERENCE
     assert np.all(np.abs(exact - found) <= size)
     assert np.abs(exact).max() > 0.0
+    return exact, found
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_derivatives_by_parameters_are_the_limits_of_differences(
+    plant_library: Path, name: str
+) -> None:
+    limits_of_differences(walking(plant_library), name, 1e-4)
 
 
 def test_seeds_of_the_torso_s_state_give_the_derivative_by_a_tuned_centre_of_mass(
@@ -120,16 +125,7 @@ def test_seeds_of_the_torso_s_state_give_the_derivative_by_a_tuned_centre_of_mas
 def test_derivatives_by_a_motor_s_numbers_and_commands_are_the_limits_of_differences(
     plant_library: Path, name: str
 ) -> None:
-    plant = walking(plant_library, start=MOTOR)
-    x, value = fetched(plant, "fmi2GetContinuousStates", len(STATES)), plant.real(name)
-    status, exact = directional(plant, SHOWN, [name], [1.0])
-    assert status == OK, plant.last_message
-    h = 1e-5 * abs(value)
-    ends = [shown_at(plant, name, value + sign * h, x) for sign in (1.0, -1.0)]
-    found = (ends[0] - ends[1]) / (2.0 * h)
-    size = np.abs(ends[0]) / abs(value) * 1e-6 + np.abs(found).max() * DIFFERENCE
-    assert np.all(np.abs(exact - found) <= size)
-    assert np.abs(exact).max() > 0.0
+    exact, found = limits_of_differences(walking(plant_library, start=MOTOR), name, 1e-5)
     voltage = SHOWN.index("supply.voltage")
     assert exact[voltage] == pytest.approx(found[voltage], rel=1e-6, abs=1e-9)
 

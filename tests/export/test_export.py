@@ -28,11 +28,6 @@ from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.robot import load_robot
 
 
-@pytest.fixture(scope="module")
-def exported(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return export_fmu(load_robot("athena"), tmp_path_factory.mktemp("export") / "athena.fmu")
-
-
 @pytest.fixture
 def heavy() -> Robot:
     robot = load_robot("athena")
@@ -53,21 +48,21 @@ def members(path: Path) -> dict[str, bytes]:
         return {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
 
 
-def test_an_exported_fmu_passes_fmpy_validation(exported: Path) -> None:
-    assert fmpy.validation.validate_fmu(str(exported)) == []
+def test_an_exported_fmu_passes_fmpy_validation(athena_fmu: Path) -> None:
+    assert fmpy.validation.validate_fmu(str(athena_fmu)) == []
 
 
-def test_the_same_robot_makes_the_same_bytes(exported: Path, tmp_path: Path) -> None:
+def test_the_same_robot_makes_the_same_bytes(athena_fmu: Path, tmp_path: Path) -> None:
     assert (
         export_fmu(load_robot("athena"), tmp_path / "again.fmu").read_bytes()
-        == exported.read_bytes()
+        == athena_fmu.read_bytes()
     )
 
 
 def test_a_bare_fmu_has_the_description_starts_and_binary_of_the_whole_one_and_no_more(
-    exported: Path, tmp_path: Path
+    athena_fmu: Path, tmp_path: Path
 ) -> None:
-    whole = members(exported)
+    whole = members(athena_fmu)
     bare = members(export_fmu(load_robot("athena"), tmp_path / "bare.fmu", bare=True))
     assert {name.partition("/")[0] for name in bare} == {
         "binaries", "modelDescription.xml", "resources",
@@ -75,26 +70,28 @@ def test_a_bare_fmu_has_the_description_starts_and_binary_of_the_whole_one_and_n
     assert all(whole[name] == content for name, content in bare.items())
 
 
-def test_the_default_robot_needs_no_resources(exported: Path, tmp_path: Path) -> None:
+def test_the_default_robot_needs_no_resources(athena_fmu: Path, tmp_path: Path) -> None:
     bare = tmp_path / "bare.fmu"
     with zipfile.ZipFile(bare, "w") as archive:
-        for name, data in members(exported).items():
+        for name, data in members(athena_fmu).items():
             if not name.startswith("resources/"):
                 archive.writestr(name, data)
     names = ["torso.position[1]", "torso.position[3]", "RR.tibia.torque"]
-    runs = [fmpy.simulate_fmu(str(path), output=names, stop_time=0.1) for path in (exported, bare)]
+    runs = [
+        fmpy.simulate_fmu(str(path), output=names, stop_time=0.1) for path in (athena_fmu, bare)
+    ]
     assert np.array_equal(*runs)
 
 
 def test_robots_differ_in_description_resources_and_pictures_only(
-    exported: Path, tmp_path: Path
+    athena_fmu: Path, tmp_path: Path
 ) -> None:
     other = members(export_fmu(load_robot("phantomx_mk4"), tmp_path / "phantomx.fmu"))
     other = {
         name.replace(f"{FOLDER}/phantomx_mk4_", f"{FOLDER}/athena_"): data
         for name, data in other.items()
     }
-    athena = members(exported)
+    athena = members(athena_fmu)
     different = {name for name in athena if athena[name] != other[name]}
     assert set(other) == set(athena)
     pictures, results = (
@@ -254,7 +251,7 @@ def test_a_binary_is_stale_a_second_before_its_newest_source(
 
 
 def test_fmpy_builds_an_fmu_of_sources_alone_into_a_binary_of_the_same_results(
-    exported: Path, tmp_path: Path
+    athena_fmu: Path, tmp_path: Path
 ) -> None:
     bare = export_fmu(load_robot("athena"), tmp_path / "sources.fmu", platforms="sources")
     unzipped = Path(fmpy.extract(str(bare), str(tmp_path / "fmu")))
@@ -264,6 +261,6 @@ def test_fmpy_builds_an_fmu_of_sources_alone_into_a_binary_of_the_same_results(
     )
     names = ["torso.position[1]", "torso.position[3]", "RR.tibia.torque"]
     rebuilt = fmpy.simulate_fmu(str(unzipped), output=names, stop_time=0.2)
-    original = fmpy.simulate_fmu(str(exported), output=names, stop_time=0.2)
+    original = fmpy.simulate_fmu(str(athena_fmu), output=names, stop_time=0.2)
     for name in names:
         assert np.array_equal(rebuilt[name], original[name])

@@ -37,11 +37,6 @@ ROUNDING = (
 )
 
 
-@pytest.fixture(scope="module")
-def exported(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return export_fmu(load_robot("athena"), tmp_path_factory.mktemp("extras") / "athena.fmu")
-
-
 @pytest.mark.parametrize("robot", [*list_robots(), *CONTROLS])
 def test_an_importer_gets_the_reference_results(
     plant_build: Path, tmp_path: Path, robot: str
@@ -107,8 +102,8 @@ def test_every_input_of_a_leg_and_the_torso_is_in_one_terminal() -> None:
     } <= set(members)
 
 
-def test_types_carry_units_and_angles_are_shown_in_degrees(exported: Path) -> None:
-    description = fmpy.read_model_description(str(exported))
+def test_types_carry_units_and_angles_are_shown_in_degrees(athena_fmu: Path) -> None:
+    description = fmpy.read_model_description(str(athena_fmu))
     variables = {variable.name: variable for variable in description.modelVariables}
     angle, speed = variables["LF.coxa.angle"], variables["LF.coxa.speed"]
     assert (angle.declaredType.name, angle.declaredType.unit, angle.displayUnit) == (

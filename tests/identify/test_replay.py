@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command import QUICK, Call, assert_refused
+from command import Call, assert_refused
 from secret_robots import with_column
 
 from hexapod_cosim.cosim.results.recordings import read_parquet, write_csv
@@ -23,22 +23,11 @@ from hexapod_cosim.extensions.identify.start import initial_state, rest_rows
 from hexapod_cosim.models import load_robot
 
 ROUND_OFF = 1e-9  # of joint angles, in rad, and of forces, in N: numbers are computed from states
-FORMATS = ["--format", "mcap", "--format", "parquet"]
 
 
 @pytest.fixture(scope="module")
-def folder(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Runs a short walk with `hexapod simulate`."""
-    from hexapod_cosim.cosim.cli import main  # noqa: PLC0415
-
-    folder = tmp_path_factory.mktemp("walked") / "out"
-    assert main(["simulate", "walk_flat", "-o", str(folder), *FORMATS, *QUICK]) == 0
-    return folder
-
-
-@pytest.fixture(scope="module")
-def log(folder: Path) -> Log:
-    return read_log(folder / "results.parquet")
+def log(recorded: Path) -> Log:
+    return read_log(recorded / "results.parquet")
 
 
 def test_a_recording_of_the_fmu_drives_it_to_the_same_readings(log: Log, athena_fmu: Path) -> None:
@@ -52,12 +41,12 @@ def test_a_recording_of_the_fmu_drives_it_to_the_same_readings(log: Log, athena_
 
 
 def test_all_formats_of_a_log_are_replayed_alike(
-    log: Log, folder: Path, athena_fmu: Path, tmp_path: Path
+    log: Log, recorded: Path, athena_fmu: Path, tmp_path: Path
 ) -> None:
-    write_csv(read_parquet(folder / "results.parquet"), tmp_path / "log.csv", units=True)
+    write_csv(read_parquet(recorded / "results.parquet"), tmp_path / "log.csv", units=True)
     robot = load_robot("athena")
     first = replay(log, robot, fmu=athena_fmu).simulated
-    for path in (tmp_path / "log.csv", folder / "results.mcap"):
+    for path in (tmp_path / "log.csv", recorded / "results.mcap"):
         assert replay(read_log(path), robot, fmu=athena_fmu).simulated.data.tobytes() == (
             first.data.tobytes()
         )
@@ -95,8 +84,8 @@ def test_a_log_without_a_pose_begins_with_the_feet_on_the_ground(
     assert errors["angle"] < 1e-3
 
 
-def test_roll_pitch_and_yaw_are_the_plants(folder: Path) -> None:
-    recording = read_parquet(folder / "results.parquet")
+def test_roll_pitch_and_yaw_are_the_plants(recorded: Path) -> None:
+    recording = read_parquet(recorded / "results.parquet")
     angles = roll_pitch_yaw(recording.vector("torso.quaternion", 4))
     expected = recording.columns(["torso.roll", "torso.pitch", "torso.yaw"])
     assert angles == pytest.approx(expected, abs=1e-12)
@@ -111,11 +100,11 @@ def test_a_replay_names_wrong_readings_and_no_others(log: Log, athena_fmu: Path)
 
 
 def test_the_command_writes_table_rows_and_report(
-    call: Call, folder: Path, tmp_path: Path, athena_fmu: Path
+    call: Call, recorded: Path, tmp_path: Path, athena_fmu: Path
 ) -> None:
     place = tmp_path / "out"
     code, out, err = call(
-        "replay", folder / "results.mcap", "-o", place, "--fmu", athena_fmu, "--json"
+        "replay", recorded / "results.mcap", "-o", place, "--fmu", athena_fmu, "--json"
     )
     assert code == 0
     assert json.loads(out)["warnings"] == []

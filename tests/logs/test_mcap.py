@@ -25,18 +25,7 @@ from hexapod_cosim.models import HexapodError, load_robot
 from hexapod_cosim.models.records import JointNames
 
 AWKWARD = [0.0, -0.0, 1.0 / 3.0, -1e-300, 5e-324, 1.7976931348623157e308, np.nan, np.inf, -np.inf]
-BOTH = ["--format", "mcap", "--format", "parquet"]
 UNIX = 1_700_000_000  # s
-
-
-@pytest.fixture(scope="module")
-def folder(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Runs a short walk with `hexapod simulate --format mcap --format parquet`."""
-    from hexapod_cosim.cosim.cli import main  # noqa: PLC0415
-
-    folder = tmp_path_factory.mktemp("recorded") / "out"
-    assert main(["simulate", "walk_flat", "-o", str(folder), *BOTH, *QUICK]) == 0
-    return folder
 
 
 def decoded(path: Path) -> dict[str, list[Any]]:
@@ -61,22 +50,23 @@ def test_every_number_reads_back_the_same_bits(tmp_path: Path) -> None:
     assert again.data.tobytes() == recording.data.tobytes()
 
 
-def test_a_run_as_mcap_is_the_same_recording_as_parquet(folder: Path) -> None:
-    table, log = read_parquet(folder / "results.parquet"), read_mcap(folder / "results.mcap")
+def test_a_run_as_mcap_is_the_same_recording_as_parquet(recorded: Path) -> None:
+    table = read_parquet(recorded / "results.parquet")
+    log = read_mcap(recorded / "results.mcap")
     assert log.names == table.names
     assert log.data.tobytes() == table.data.tobytes()
 
 
-def test_equal_recordings_make_equal_files(folder: Path, tmp_path: Path) -> None:
-    recording = read_mcap(folder / "results.mcap")
+def test_equal_recordings_make_equal_files(recorded: Path, tmp_path: Path) -> None:
+    recording = read_mcap(recorded / "results.mcap")
     for name in ("a", "b"):
         write_mcap(recording, tmp_path / f"{name}.mcap", about={"control": "kinematic"})
     assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
 
 
-def test_other_readers_see_the_messages_of_ros_2(folder: Path) -> None:
-    recording = read_parquet(folder / "results.parquet")
-    topics = decoded(folder / "results.mcap")
+def test_other_readers_see_the_messages_of_ros_2(recorded: Path) -> None:
+    recording = read_parquet(recorded / "results.parquet")
+    topics = decoded(recorded / "results.mcap")
     feet = {f"/{leg}/foot_force" for leg in ("LF", "LM", "LR", "RF", "RM", "RR")}
     assert set(topics) == {
         "/joint_states", "/joint_commands", "/imu", "/tf", "/hexapod/recording", *feet
@@ -99,17 +89,17 @@ def test_other_readers_see_the_messages_of_ros_2(folder: Path) -> None:
     assert pose.transform.translation.x == recording.column("torso.position[1]")[7]
 
 
-def test_the_file_says_what_was_run(folder: Path) -> None:
-    with (folder / "results.mcap").open("rb") as file:
+def test_the_file_says_what_was_run(recorded: Path) -> None:
+    with (recorded / "results.mcap").open("rb") as file:
         (metadata,) = make_reader(file).iter_metadata()
-    facts = json.loads((folder / "run.json").read_text())
+    facts = json.loads((recorded / "run.json").read_text())
     assert metadata.metadata["control"] == "kinematic"
     assert json.loads(metadata.metadata["robot"]) == facts["robot"]
 
 
-def test_reading_by_topics_yields_the_numbers_of_the_columns(folder: Path) -> None:
-    recording = read_mcap(folder / "results.mcap")
-    topics = read_topics(folder / "results.mcap")
+def test_reading_by_topics_yields_the_numbers_of_the_columns(recorded: Path) -> None:
+    recording = read_mcap(recorded / "results.mcap")
+    topics = read_topics(recorded / "results.mcap")
     shared = [name for name in topics.names if name in recording.names and name != "time"]
     assert len(shared) == 139  # 6 x 18 joint quantities, 18 of feet, 6 of the IMU, 7 of the pose
     assert np.array_equal(topics.columns(shared), recording.columns(shared))
@@ -194,10 +184,16 @@ def test_a_damaged_file_is_refused(tmp_path: Path, content: bytes) -> None:
         read_mcap(tmp_path / "x.mcap")
 
 
-def test_a_cut_file_is_refused(folder: Path, tmp_path: Path) -> None:
-    content = (folder / "results.mcap").read_bytes()
+def test_a_cut_file_is_refused(recorded: Path, tmp_path: Path) -> None:
+    content = (recorded / "results.mcap").read_bytes()
     (tmp_path / "x.mcap").write_bytes(content[: len(content) // 2])
-    with pytest.raises(HexapodError, match="not an MCAP file of a robot"):
+    said = "not an MCAP file of a robot: got 'a file that is no undamaged MCAP file'"
+    with pytest.raises(HexapodError, match=said):
+        read_mcap(tmp_path / "x.mcap")
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(HexapodError, match=r"no such recording: got '.*x\.mcap'; correct the path"):
         read_mcap(tmp_path / "x.mcap")
 
 
@@ -219,7 +215,7 @@ def test_a_run_that_begins_before_0_is_refused_before_it_is_run(call: Call, tmp_
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_a_report_is_made_again_from_mcap_alone(call: Call, folder: Path, tmp_path: Path) -> None:
+def test_a_report_is_made_again_from_mcap_alone(call: Call, recorded: Path, tmp_path: Path) -> None:
     place = tmp_path / "out"
     assert call("simulate", "walk_flat", "--format", "mcap", "-o", place, *QUICK)[0] == 0
     assert sorted(path.name for path in place.iterdir()) == [

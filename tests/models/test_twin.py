@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from states import random_bodies, random_command
 
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.constraints import constraints, joint_reactions
 from hexapod_cosim.models.dynamics import (
-    Command,
     accelerations,
     applied_forces,
     drive_acceleration,
@@ -21,7 +21,6 @@ from hexapod_cosim.models.dynamics import (
 )
 from hexapod_cosim.models.kinematics import (
     axis_quaternion,
-    body_states,
     cross,
     joint_models,
     joint_speeds,
@@ -34,34 +33,6 @@ DIFFERENCE = 1e-6  # s, of central differences, whose error is about 1e-8 of the
 DIFFERENCES_AGREE = 1e-6
 ROBOTS = ("athena", "phantomx_mk4")
 NO_CONTACT = np.full(6, np.nan)
-
-
-def random_bodies(robot: Robot, seed: int, *, height: float = 0.12, drift: float = 0.0) -> Array:
-    """Returns moving bodies near the stance; `drift` moves them off their joints (m, m/s and so
-    on).
-    """
-    rng = np.random.default_rng(seed)
-    quaternion = np.array([1.0, 0.0, 0.0, 0.0]) + rng.normal(0.0, 0.05, 4)
-    angle, speed = robot.stance + rng.normal(0.0, 0.2, (6, 3)), rng.normal(0.0, 2.0, (6, 3))
-    position = np.array([0.3, -0.2, height])
-    body = body_states(
-        robot, position, quaternion, rng.normal(0.0, 0.3, 3), rng.normal(0.0, 1.0, 3), angle, speed
-    )
-    body = body + drift * rng.normal(0.0, 1.0, body.shape)
-    body[:, 3:7] /= np.linalg.norm(body[:, 3:7], axis=1, keepdims=True)
-    return body
-
-
-def random_command(robot: Robot, seed: int) -> Command:
-    rng = np.random.default_rng(seed + 1000)
-    return Command(
-        angle_ref=robot.stance + rng.normal(0.0, 0.1, (6, 3)),
-        speed_ref=rng.normal(0.0, 0.5, (6, 3)),
-        torque_ref=rng.normal(0.0, 0.5, (6, 3)),
-        push_force=rng.normal(0.0, 20.0, 3),
-        push_torque=rng.normal(0.0, 2.0, 3),
-        age=0.003,
-    )
 
 
 def with_mode(robot: Robot, mode: str) -> Robot:
@@ -117,6 +88,7 @@ def test_accelerations_satisfy_the_stabilised_constraints_and_every_body_balance
 ) -> None:
     robot = with_mode(load_robot("phantomx_mk4"), mode)
     body, command = random_bodies(robot, 4, drift=0.01), random_command(robot, 4)
+    command = replace(command, age=0.003)
     result, joints = accelerations(robot, body, command, np.full(6, 5.0)), constraints(robot, body)
     alpha, beta = robot.baumgarte.alpha, robot.baumgarte.beta
     wanted = joints.gamma - 2.0 * alpha * joints.dphi - beta**2 * joints.phi
@@ -156,7 +128,8 @@ def test_a_kinematic_drive_gives_the_commanded_acceleration_and_its_multiplier_i
     None
 ):
     robot = with_mode(load_robot("athena"), "kinematic")
-    body, command, damping = random_bodies(robot, 10), random_command(robot, 10), np.full(6, 3.0)
+    body, command = random_bodies(robot, 10), replace(random_command(robot, 10), age=0.003)
+    damping = np.full(6, 3.0)
     driven = accelerations(robot, body, command, damping)
     G = constraints(robot, body).G
     assert close(G @ driven.dv.ravel(), drive_acceleration(robot, body, command).ravel(), 1e-10)

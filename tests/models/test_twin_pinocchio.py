@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from states import random_bodies, random_command
 
 from hexapod_cosim.models import LEG_NAMES, Robot, load_robot
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.constraints import constraints
 from hexapod_cosim.models.contact.geometry import foot_contacts, foot_force
-from hexapod_cosim.models.dynamics import Command, accelerations, joint_torques
+from hexapod_cosim.models.dynamics import accelerations, joint_torques
 from hexapod_cosim.models.energy import kinetic_energy
 from hexapod_cosim.models.kinematics import (
-    body_states,
     inertia_matrix,
     joint_angles,
     joint_speeds,
@@ -28,27 +28,6 @@ from hexapod_cosim.models.kinematics import (
 # relative to the largest entry: about 1e3 times the rounding of the two algorithms
 AGREEMENT = 1e-11
 ROBOTS = ("athena", "phantomx_mk4")
-
-
-def random_bodies(robot: Robot, seed: int) -> Array:
-    """Returns moving bodies near the stance, some of whose feet are in the ground."""
-    rng = np.random.default_rng(seed)
-    quaternion, position = rng.normal(0.0, 0.05, 4) + np.eye(4)[0], np.array([0.3, -0.2, 0.12])
-    angle, speed = robot.stance + rng.normal(0.0, 0.2, (6, 3)), rng.normal(0.0, 2.0, (6, 3))
-    return body_states(
-        robot, position, quaternion, rng.normal(0.0, 0.3, 3), rng.normal(0.0, 1.0, 3), angle, speed
-    )
-
-
-def random_command(robot: Robot, seed: int) -> Command:
-    rng = np.random.default_rng(seed + 1000)
-    return Command(
-        angle_ref=robot.stance + rng.normal(0.0, 0.1, (6, 3)),
-        speed_ref=rng.normal(0.0, 0.5, (6, 3)),
-        torque_ref=rng.normal(0.0, 0.5, (6, 3)),
-        push_force=rng.normal(0.0, 20.0, 3),
-        push_torque=rng.normal(0.0, 2.0, 3),
-    )
 
 
 def pinocchio_model(robot: Robot) -> Any:

@@ -7,9 +7,9 @@ import ctypes as ct
 import numpy as np
 import pytest
 from plant import Plant, asked, inputs, probed
-from states import changed, distance, lopsided, random_bodies
+from states import DRIFT, changed, distance, drifted, lopsided
 
-from hexapod_cosim.models import CONTACT_LAWS, Robot, load_robot
+from hexapod_cosim.models import CONTACT_LAWS, load_robot
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.constraints import joint_kinematics
@@ -27,15 +27,7 @@ from hexapod_cosim.models.servos.motor import Power
 
 # relative: the same formula with its operations in another order, some hundred roundings
 SAME = 1e-13
-DRIFT = 0.02
 LEG_JOINTS = [(leg, joint) for leg in range(6) for joint in range(3)]
-
-
-def drifted(core: ct.CDLL, robot: Robot, seed: int) -> tuple[Plant, Array]:
-    plant = Plant(core, robot)
-    body = random_bodies(robot, seed, drift=DRIFT)
-    plant.bodies = body
-    return plant, body
 
 
 # rotations and frames

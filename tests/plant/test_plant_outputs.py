@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 from mirror import OK, HxDefinition, HxInput
 from plant import Plant, bound, definition, seen
-from states import changed, distance, lopsided, random_bodies, random_command
+from states import changed, distance, drifted, lopsided, random_command
 
-from hexapod_cosim.models import Robot, load_robot
-from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.constraints import constraint_errors, joint_reactions
 from hexapod_cosim.models.contact.geometry import foot_contacts
 from hexapod_cosim.models.energy import kinetic_energy, potential_energy
@@ -28,15 +27,7 @@ CONTACT_SAME = (
     # relative, of forces: a penetration of 1e-5 m is the difference of coordinates of about 0.1 m
     1e-10
 )
-DRIFT = 0.02
 SLOPE = {"kind": "slope", "height": -0.02, "incline": 0.3, "heading": 2.1}
-
-
-def drifted(core: ct.CDLL, robot: Robot, seed: int) -> tuple[Plant, Array]:
-    plant = Plant(core, robot)
-    body = random_bodies(robot, seed, drift=DRIFT)
-    plant.bodies = body
-    return plant, body
 
 
 @pytest.mark.parametrize("mode", ["position", "torque", "kinematic"])

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import Call
-from gains import make_gains
+from gains import gains_of
 
-from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.master.recorder import Peaks, Recording
 from hexapod_cosim.cosim.results.facts import Result
@@ -51,14 +50,6 @@ def walk_of(control: str, interval: float) -> Scenario:
         "outputs.plots=false",
     )
     return load_scenario("walk_flat", overrides=[*settings, f"outputs.interval={interval}"])
-
-
-def gains_of(scenario: Scenario) -> Gains | None:
-    return (
-        None
-        if scenario.control == "kinematic"
-        else make_gains(load_robot("athena"), period=scenario.macro_step)
-    )
 
 
 @pytest.fixture(scope="module", params=CONTROLS)

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gains import make_gains
+from gains import gains_of
 from memory import resident
 
-from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.control.fmu_law import law_of_ours
 from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.master.fmu import Fmu
@@ -65,14 +64,6 @@ pytestmark = pytest.mark.usefixtures("plant_build")
 def planned(name: str, *changes: str, seed: int | None = None) -> Scenario:
     scenario = load_scenario(name, overrides=["duration=2.5", "gait.period=0.6", *changes])
     return scenario if seed is None else replace(scenario, seed=seed, variation=STANDARD)
-
-
-def gains_of(scenario: Scenario) -> Gains | None:
-    return (
-        None
-        if scenario.control == "kinematic"
-        else make_gains(load_robot(scenario.robot), period=scenario.macro_step)
-    )
 
 
 def in_python(scenario: Scenario, runner: Runner) -> tuple[Outcome, Result]:

@@ -6,7 +6,8 @@ import math
 
 from hexapod_cosim.controller import Controller, Gains, Margins, PaperGains, Requirements
 from hexapod_cosim.controller.gains import HoldGains, LimitGains, SupportGains
-from hexapod_cosim.models import Robot
+from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.models import Robot, load_robot
 
 PERIOD = 0.005  # s
 MARGINS = Margins(
@@ -58,6 +59,13 @@ def make_gains(robot: Robot, *, period: float = PERIOD) -> Gains:
         paper=PAPER,
         margins=MARGINS,
     )
+
+
+def gains_of(scenario: Scenario) -> Gains | None:
+    """Returns plausible gains for a scenario; None under kinematic control."""
+    if scenario.control == "kinematic":
+        return None
+    return make_gains(load_robot(scenario.robot), period=scenario.macro_step)
 
 
 def unwatched(controller: Controller) -> Controller:

@@ -4,6 +4,7 @@ equations allow.
 
 from __future__ import annotations
 
+import ctypes as ct
 from dataclasses import replace
 from typing import Any
 
@@ -20,6 +21,7 @@ from hexapod_cosim.models.kinematics import body_states
 
 LEGS, JOINTS = 6, 3
 MACRO = 0.004  # s, macro-step of a trail
+DRIFT = 0.02  # m, m/s, ... of drifted bodies
 
 
 def changed(robot: Robot, **sections: dict[str, Any]) -> Robot:
@@ -162,6 +164,13 @@ def random_bodies(robot: Robot, seed: int, *, drift: float = 0.0) -> Array:
     body[:, 3:7] /= np.linalg.norm(body[:, 3:7], axis=1, keepdims=True)
     body[:, 2] += lift(robot, body)
     return body
+
+
+def drifted(core: ct.CDLL, robot: Robot, seed: int) -> tuple[Plant, Array]:
+    """Returns a plant at random bodies that are off their joints by about DRIFT, and the bodies."""
+    plant, body = Plant(core, robot), random_bodies(robot, seed, drift=DRIFT)
+    plant.bodies = body
+    return plant, body
 
 
 def random_command(robot: Robot, seed: int, *, size: float = 1.0) -> Command:

@@ -40,6 +40,17 @@ def holder(folder: Path, temporary: Path) -> subprocess.Popen[str]:
     )
 
 
+def assert_held(process: subprocess.Popen[str], folder: Path) -> None:
+    """Waits until a process holds its folder, which is refused to others."""
+    assert process.stdout is not None
+    process.stdout.readline()
+    with (
+        pytest.raises(HexapodError, match="another process writes its results into this folder"),
+        results_folder(folder),
+    ):
+        pass
+
+
 @pytest.fixture
 def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The system's temporary folder for this test and its processes."""
@@ -54,37 +65,23 @@ def test_a_second_process_is_refused_and_the_lock_of_a_killed_one_is_free(
 ) -> None:
     folder = tmp_path / "out"
     process = holder(folder, temporary)
-    assert process.stdout is not None
-    process.stdout.readline()
-    with (
-        pytest.raises(HexapodError, match="another process writes its results into this folder"),
-        results_folder(folder),
-    ):
-        pass
+    assert_held(process, folder)
     process.send_signal(signal.SIGKILL)
-    process.wait()
+    process.communicate()
     with results_folder(folder):
         pass
-    process.stdout.close()
 
 
 def test_the_lock_is_of_the_folder_and_leaves_no_file(tmp_path: Path, temporary: Path) -> None:
     folder, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
     elsewhere.mkdir()
     process = holder(folder, elsewhere)  # with another temporary folder
-    assert process.stdout is not None
-    process.stdout.readline()
-    with (
-        pytest.raises(HexapodError, match="another process writes its results into this folder"),
-        results_folder(folder),
-    ):
-        pass
+    assert_held(process, folder)
     process.communicate()
     with results_folder(folder):
         pass
     assert list(temporary.iterdir()) == []
     assert not list(elsewhere.glob("*.lock"))
-    process.stdout.close()
 
 
 # Files are written completely or not at all.
