@@ -32,6 +32,7 @@ from hexapod_cosim.controller.walk.gait_clock import NO_LEG
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.controller.walk.posture import LEVEL
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.errors import check_type
 
 ALL_PARTS = Parts()
 CLOCK_TOLERANCE = 0.01  # 1    of a period, between the time given and the steps counted
@@ -60,6 +61,7 @@ class Controller(Stateful):
         parts: Parts = ALL_PARTS,
         law: str = "compliant",
     ) -> None:
+        check_type(robot, Robot, "a Robot, as of load_robot()", where="robot")
         check_period(period, gait)
         check_law(law)
         self.robot, self.period, self.gains, self.parts = robot, period, gains, parts

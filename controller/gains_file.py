@@ -44,12 +44,8 @@ def save_gains(gains: Gains, path: str | Path) -> Path:
         partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
         partial.replace(target)
     except OSError as error:
-        raise GainsError(
-            "cannot write the gains file",
-            got=error.strerror,
-            fix="choose a writable folder",
-            where=str(target),
-        ) from error
+        what, fix = "cannot write the gains file", "choose a writable folder"
+        raise GainsError(what, got=error.strerror, fix=fix, where=str(target)) from error
     return target
 
 
@@ -73,19 +69,12 @@ def load_gains(path: str | Path) -> Gains:
         with decoding_toml(Path(path), kind="gains", error=GainsError):
             table = parse_toml(read_text(Path(path)))
     except OSError as error:
-        raise GainsError(
-            "cannot read the gains file",
-            got=error.strerror,
-            fix="make one with `hexapod design`",
-            where=str(path),
-        ) from error
-    if table.pop("format", None) != FORMAT:
-        raise GainsError(
-            "unknown format of gains",
-            expected=f"format = {FORMAT}",
-            fix="make the file again with `hexapod design`",
-            where=str(path),
-        )
+        what, fix = "cannot read the gains file", "make one with `hexapod design`"
+        raise GainsError(what, got=error.strerror, fix=fix, where=str(path)) from error
+    found, expected = table.pop("format", None), f"format = {FORMAT}"
+    if found != FORMAT:
+        what, fix = "unknown format of gains", "make the file again with `hexapod design`"
+        raise GainsError(what, got=found, expected=expected, fix=fix, where=str(path))
     with raising_gains_errors():
         return _read(table, str(path))
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import NoneType
 from typing import Any
 from warnings import warn
 
@@ -80,10 +81,11 @@ def simulate(
         RuntimeWarning: the run ended early, with the reason: its metrics are NaN.
     """
     check_type(scenario, (str, Path, Scenario), "a name, a path or a Scenario", where="scenario")
-    if settings is not None:
-        check_type(settings, Mapping, "a dict of values by name", where="settings")
-    if gains is not None:
-        check_type(gains, (str, Path, Gains), "gains or the path of their file", where="gains")
+    check_type(settings, (Mapping, NoneType), "a dict of values by name", where="settings")
+    check_type(label, (str, NoneType), "a name", where="label")
+    check_type(fmu, (str, Path, NoneType), "the path of an FMU", where="fmu")
+    given = "gains or the path of their file"
+    check_type(gains, (str, Path, Gains, NoneType), given, where="gains")
     text = controller.text if isinstance(controller, Control) else controller
     text = text if isinstance(text, str) else None
     law = None if text is not None else controller
@@ -125,6 +127,7 @@ def report(results: Result | Sequence[Result], folder: str | Path) -> Path:
     """
     kinds, expected = (Result, Sequence), "a result of simulate(), or several"
     check_type(results or None, kinds, expected, where="results")
+    check_type(folder, (str, Path), "the path of a folder", where="folder")
     runs = [results] if isinstance(results, Result) else list(results)
     for run in runs:
         check_type(run, Result, expected, where="results")

@@ -145,12 +145,10 @@ def advance(start: Start, h_max: float, next_step: float) -> tuple[State, float,
         tried, rejected = tried + 1, rejected + 1
         h *= min(step_factor(method, trial.error), 0.9)
         if h < STEP_FLOOR:
-            raise HexapodError(
-                "the error control finds no step that meets the tolerance",
-                got=h,
-                expected=f"a step of at least {STEP_FLOOR:g} s",
-                fix="check the inputs for extreme values, or raise solver.tolerance",
-            )
+            what = "the error control finds no step that meets the tolerance"
+            expected = f"a step of at least {STEP_FLOOR:g} s"
+            fix = "check the inputs for extreme values, or raise solver.tolerance"
+            raise HexapodError(what, got=h, expected=expected, fix=fix)
     if solver.step == 0.0:
         next_step = min(solver.step_max, h * step_factor(method, trial.error))
         kept = next_step if h < h_max else max(next_step, state.next_step)

@@ -118,6 +118,7 @@ def robot_from_table(table: Mapping[str, Any], *, where: str) -> Robot:
 
     where: name of the file for messages.
     """
+    expect_table(table, where)
     refuse_unknown_keys(table, ["name", "gravity", "source", "links", "legs", *SECTIONS], where)
     sections = {
         name: _read_section(table, name, f"{where}: {name}")

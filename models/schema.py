@@ -11,6 +11,7 @@ import re
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
+from numbers import Integral, Real
 from typing import Any, cast, get_type_hints
 
 from hexapod_cosim.models.errors import RobotError, unknown_name
@@ -60,9 +61,9 @@ class Number:
     def read(self, value: Any, where: str) -> float:
         """Returns the value as a float. Raises RobotError; `where` names the key."""
         value = _in_si(value, self.unit, where)
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        if isinstance(value, bool) or not isinstance(value, Real):  # NumPy's as well
             raise wrong_type(value, self.expected, "give a number", where)
-        if not self.holds(value):
+        if not self.holds(float(value)):
             fix = "correct the value and its unit"
             raise RobotError(
                 "value not allowed", got=value, expected=self.expected, fix=fix, where=where
@@ -171,12 +172,12 @@ class Whole:
 
     def read(self, value: Any, where: str) -> int:
         """Returns the value. Raises RobotError; `where` names the key."""
-        if isinstance(value, bool) or not isinstance(value, int):
+        if isinstance(value, bool) or not isinstance(value, Integral):  # NumPy's as well
             raise wrong_type(value, self.expected, "write 1 or another whole number", where)
         if value < 0:
             what, fix = "out of range", "write 0 or a larger whole number"
             raise RobotError(what, got=value, expected=self.expected, fix=fix, where=where)
-        return value
+        return int(value)
 
 
 Spec = Number | Vector | Choice | Text | Texts | Flag | Whole

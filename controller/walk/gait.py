@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.models import GAITS, HexapodError, Robot, unknown_name
+from hexapod_cosim.models.errors import check_type
 
 AROUND_TO_LEGS = (5, 4, 3, 0, 1, 2)  # LF LM LR RF RM RR in the order around the robot
 
@@ -125,7 +126,9 @@ def make_gait(
 
     Raises HexapodError: unknown name (with the nearest valid one), impossible values.
     """
+    check_type(robot, Robot, "a Robot, as of load_robot()", where="robot")
     name = robot.gait.name if name is None else name
+    check_type(name, str, "the name of a gait", where="name")
     if name not in PATTERNS:
         raise unknown_name("gait", name, GAITS)
     if duty is None:

@@ -20,6 +20,7 @@ from hexapod_cosim.controller.walk.gait_clock import NO_LEG
 from hexapod_cosim.controller.walk.kinematics import Feet, LegSolver
 from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.controller.walk.swing import Twist, blend, hop, travel
+from hexapod_cosim.models.errors import check_type
 
 # 1    joint speed that a command may need, over the largest one or over that of steps on the spot:
 # servos follow so short a peak (the PhantomX's own walk has 1.056), and feet land late from 1.2 on
@@ -85,10 +86,9 @@ class Pace(Stateful):
 
         absent: (6,) legs that do not walk; other arguments are those of needed().
         """
+        check_type(command, BodyCommand, "a BodyCommand", where="command")
         self.asked, self.outrun = command, NO_LEG
         whole = np.array(astuple(command), dtype=np.float64)
-        if not np.isfinite(whole).all():
-            return command  # the ramp refuses it
 
         def speeds(share: float) -> Array:
             part = np.concatenate([share * whole[:3], whole[3:]])

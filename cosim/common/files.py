@@ -123,6 +123,15 @@ def without_none(content: Any) -> Any:
     return [without_none(value) for value in content] if isinstance(content, list) else content
 
 
+def why_unreadable(error: Exception, kind: str) -> str:
+    """Returns in words why a file cannot be read as a file of some kind."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    if isinstance(error, KeyError):  # its text begins with the key
+        return f"a file without {str(error.args[0]).partition(' ')[0]}"
+    return f"a file that is no {kind}"
+
+
 def not_writable(path: Path, error: OSError) -> HexapodError:
     """Returns the error for a path that cannot be written."""
     got, expected = error.strerror or str(error), "a place that can be written to"

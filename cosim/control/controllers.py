@@ -222,12 +222,8 @@ def _file_hash(path: Path) -> str:
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
-        raise HexapodError(
-            "cannot read the control's file",
-            got=error.strerror,
-            fix="correct the path, or allow to read the file",
-            where=str(path),
-        ) from error
+        what, fix = "cannot read the control's file", "leave it in its place during the run"
+        raise HexapodError(what, got=error.strerror, fix=fix, where=str(path)) from error
 
 
 def text_of_law(law: Any, label: str | None = None) -> str:

@@ -107,13 +107,8 @@ class ControllerFmu3:
             slave.instantiate(logMessage=self._log, loggingOn=True)
         except Exception as error:
             self._directory.close()
-            raise FmuError(
-                "the FMU cannot be loaded",
-                got=str(error),
-                expected=f"an FMU of FMI 3.0 with a binary for {platform_tuple}",
-                fix="export it again on this machine with `hexapod export`",
-                where=str(path),
-            ) from error
+            what, expected = "the FMU cannot be loaded", f"a binary for {platform_tuple}"
+            raise FmuError(what, got=str(error), expected=expected, where=str(path)) from error
         self.slave = slave
 
     def _log(self, _environment: Any, _status: Any, _category: Any, message: Any) -> None:
@@ -139,12 +134,8 @@ class ControllerFmu3:
         """Returns a block of variables of one type."""
         kinds = {self.variables[name].type for name in names} or {"Float64"}
         if len(kinds) != 1:
-            raise FmuError(
-                "connected variables of several types",
-                got=sorted(kinds),
-                fix="give its inputs one floating-point type, and its outputs one",
-                where=str(self.path),
-            )
+            what, fix = "connected variables of several types", "give them one type"
+            raise FmuError(what, got=sorted(kinds), fix=fix, where=str(self.path))
         return Block3(self, names, kinds.pop(), sum(self._size(name) for name in names))
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:

@@ -66,12 +66,8 @@ def _module(path: Path, _changed: int, _size: int) -> ModuleType:
     name = f"hexapod_law_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise ControllerError(
-            "not a Python file",
-            got=str(path),
-            expected="a name that ends in .py",
-            fix="rename the file",
-        )
+        expected, fix = "a name that ends in .py", "rename the file"
+        raise ControllerError("not a Python file", got=str(path), expected=expected, fix=fix)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     sys.path.insert(0, str(path.parent))

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from hexapod_cosim.cosim.common.files import why_unreadable
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.logs import messages as ros
 from hexapod_cosim.cosim.logs.mcap_writer import ABOUT, COLUMNS, NANO, OURS
@@ -60,16 +61,12 @@ def read_mcap(path: Path, *, robot: Robot | None = None) -> Recording:
     except HexapodError:
         raise
     except FileNotFoundError as error:
-        raise HexapodError(
-            "no such recording",
-            got=str(path),
-            expected="an MCAP file",
-            fix="correct the path, or record one with `hexapod simulate --format mcap`",
-        ) from error
+        fix = "correct the path, or record one with `hexapod simulate --format mcap`"
+        raise HexapodError("no such recording", got=str(path), fix=fix) from error
     except (OSError, McapError, *UNREADABLE) as error:
         raise HexapodError(
             "not an MCAP file of a robot",
-            got=f"{type(error).__name__}: {' '.join(str(error).split())}",
+            got=why_unreadable(error, "undamaged MCAP file"),
             expected="an MCAP file with ROS 2 messages in CDR",
             fix="record it again, or convert it with `mcap recover`",
             where=str(path),

@@ -199,12 +199,8 @@ class Fmu(Closing):
             if status > WARNING and self.log.messages:  # the message has name, value and range
                 raise FmuError(self.log.last_of(status), where=self.path.name)
             if status > WARNING:
-                raise FmuError(
-                    f"{name}: the FMU refuses the value",
-                    got=value,
-                    fix="give one within the range that its modelDescription.xml states",
-                    where=self.path.name,
-                )
+                what, fix = f"{name}: the FMU refuses the value", "give one in its range"
+                raise FmuError(what, got=value, fix=fix, where=self.path.name)
 
     def _parameter(self, name: str) -> Any:
         """Returns the variable of a parameter. Raises FmuError when the name is none."""
@@ -247,12 +243,8 @@ class Fmu(Closing):
             call()
         except Exception as error:
             got = self.log.last(str(error))
-            raise FmuError(
-                "the FMU cannot be initialised",
-                got=got,
-                fix="correct the parameters or the initial state that it names",
-                where=str(self.path),
-            ) from error
+            what, fix = "the FMU cannot be initialised", "correct the parameters that it names"
+            raise FmuError(what, got=got, fix=fix, where=str(self.path)) from error
 
     def reset(self) -> None:
         """Resets the instance to its start values, not initialised. Raises FmuError."""

@@ -23,6 +23,7 @@ from hexapod_cosim.cosim.interface.names import (
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.models import HexapodError, ScenarioError, suggestion
 from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.errors import check_type
 
 BLOCK_ROWS = 500  # that are stored at once
 PEAKS = ("peak_force", "peak_force_rate")  # of a foot, within the last communication step
@@ -70,6 +71,7 @@ class Recording:
         Those that adjoin in memory are returned as a view that cannot be written.
         """
         for name in names:
+            check_type(name, str, "the name of a column", where="column", error=ColumnError)
             if name not in self._index:
                 otherwise = "record it: outputs.csv names the columns that are kept"
                 fix = suggestion(name, self.names, otherwise=otherwise)

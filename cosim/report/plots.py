@@ -100,11 +100,8 @@ def feet(views: Views) -> Figure:
     axes = figure.subplots(2, 3, sharey=True)
     planning = {label: view for label, view in views.items() if plans_feet(view.recording)}
     if not planning:
-        raise ColumnError(
-            "no plan of the feet was recorded",
-            got=f"runs of {', '.join(views)}",
-            expected="a controller that reports its plan",
-        )
+        got, expected = f"runs of {', '.join(views)}", "a controller that reports its plan"
+        raise ColumnError("no plan of the feet was recorded", got=got, expected=expected)
     for number, (label, view) in enumerate(planning.items()):
         end = view.last_cycles()
         planned, real = planned_feet(end.recording), real_feet(end.recording, view.parameters)

@@ -68,11 +68,8 @@ def profile(views: Mapping[str, View]) -> Figure:
     """
     shown = {label: view for label, view in views.items() if view.surface is not None}
     if not shown:
-        raise ColumnError(
-            "no surface was recorded",
-            got=f"runs of {', '.join(views)}",
-            expected="a run whose terrain is a surface",
-        )
+        got, expected = f"runs of {', '.join(views)}", "a run whose terrain is a surface"
+        raise ColumnError("no surface was recorded", got=got, expected=expected)
     figure, styles = Figure(figsize=(WIDTH, 0.4 + 1.8 * len(shown))), control_styles(views)
     axes = np.atleast_1d(figure.subplots(len(shown), 1, sharex=True, sharey=True))
     for axis, (label, view) in zip(axes, shown.items(), strict=True):

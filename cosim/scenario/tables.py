@@ -16,7 +16,7 @@ from hexapod_cosim.cosim.scenario import list_scenarios
 from hexapod_cosim.cosim.scenario.controls import LAW, control_beside
 from hexapod_cosim.cosim.scenario.records import KEYS, SECTIONS, SETTINGS
 from hexapod_cosim.models import ScenarioError, unknown_name
-from hexapod_cosim.models.errors import refuse_path
+from hexapod_cosim.models.errors import check_type, refuse_path
 from hexapod_cosim.models.files import parse_toml, read_text, reading_toml
 from hexapod_cosim.models.ground.table import terrain_beside
 from hexapod_cosim.models.schema import specs
@@ -42,6 +42,9 @@ def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
         path, kind="scenario", name="the scenario", names=list_scenarios, error=ScenarioError
     ):
         table = parse_toml(read_text(path))
+    if not table:
+        what, fix = "an empty scenario", "write one, for example `command.vx = 0.08`"
+        raise ScenarioError(what, expected="at least one key", fix=fix, where=str(path))
     table = terrain_beside(table, path.parent)
     refuse_path(str(table.get("robot", "")), "the robot file", ScenarioError)
     if "control" in table:
@@ -95,6 +98,7 @@ def with_values(
     """
     changed = deepcopy(dict(table))
     for name, value in values.items():
+        check_type(name, str, "the name of a setting", where=where, error=ScenarioError)
         _set(changed, name, value, where)
     return changed
 

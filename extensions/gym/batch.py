@@ -246,12 +246,9 @@ class Batch(Closing):
                 return
             numbers = None
         failed = int(np.flatnonzero(starting)[0])
-        raise FmuError(
-            f"environment {failed} cannot start",
-            got=self.message(failed),
-            expected=f"one start in {STARTS} episodes",
-            fix="narrow the ranges from which parameters are drawn",
-        )
+        what, expected = f"environment {failed} cannot start", f"a start in {STARTS} episodes"
+        fix = "narrow the ranges from which parameters are drawn"
+        raise FmuError(what, got=self.message(failed), expected=expected, fix=fix)
 
     def step(self) -> None:
         """Steps all environments under `action`.

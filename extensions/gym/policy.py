@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.components import Component
-from hexapod_cosim.cosim.common.files import atomic_path
+from hexapod_cosim.cosim.common.files import atomic_path, why_unreadable
 from hexapod_cosim.cosim.interface.plant import expand_interface
 from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.extensions.gym.settings import BLOCKS, JOINTS, MEASURABLE, RATE, EnvSettings
@@ -84,12 +84,11 @@ def load_policy(path: Path) -> Policy:
         with np.load(path, allow_pickle=False) as file:
             values = {name: file[name] for name in names}
     except (OSError, EOFError, ValueError, KeyError, TypeError, BadZipFile) as error:
-        raise _no_policy(path, str(error)) from error
-    for name, shape in SHAPES.items():
-        if values[name].shape != shape or not np.isfinite(values[name]).all():
-            raise _no_policy(
-                path, f"{name} of shape {values[name].shape}, expected {shape}, finite"
-            )
+        raise _no_policy(path, why_unreadable(error, "archive of numbers")) from error
+    for name, shape in {**SHAPES, "clock": (), "action_scale": ()}.items():
+        value = values[name]
+        if value.dtype.kind not in "fiu" or value.shape != shape or not np.isfinite(value).all():
+            raise _no_policy(path, f"{name} that is not of finite numbers of shape {shape}")
     return Policy(
         **{name: values[name].astype(float) for name in SHAPES},
         robot=str(values["robot"]),

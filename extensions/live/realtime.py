@@ -79,12 +79,9 @@ def _measure(
         for number in range(count):
             robot.step(command, NO_FORCE)
             if robot.fault:
-                raise HexapodError(
-                    "the robot did not walk to the end",
-                    got=f"{robot.fault} (macro-step {number})",
-                    expected=f"{count} macro-steps",
-                    fix="measure a scenario that `hexapod simulate` completes",
-                )
+                what, expected = "the robot did not walk to the end", f"{count} macro-steps"
+                fix = "measure a scenario that `hexapod simulate` completes"
+                raise HexapodError(what, got=robot.fault, expected=expected, fix=fix)
             if progress is not None and number % 1000 == 0:
                 progress(number * robot.h)
     finally:

@@ -105,12 +105,9 @@ def _connect(address: str) -> Any:
     try:
         from distributed import Client  # noqa: PLC0415  an extra
     except ImportError as error:
-        raise StudyError(
-            "Dask is not installed",
-            expected="the extra `cluster`",
-            fix=install_extra("cluster"),
-            where="--scheduler",
-        ) from error
+        what, expected = "Dask is not installed", "the extra `cluster`"
+        fix = install_extra("cluster")
+        raise StudyError(what, expected=expected, fix=fix, where="--scheduler") from error
     try:
         if "://" not in address:
             raise ValueError

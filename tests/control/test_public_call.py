@@ -20,7 +20,9 @@ from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Meas
 from hexapod_cosim.cosim.control.new_law import class_name, module_name, write_law
 from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.metric_table import METRICS
-from hexapod_cosim.models import HexapodError, Robot, load_robot
+from hexapod_cosim.cosim.scenario.reading import scenario_from_table
+from hexapod_cosim.cosim.scenario.tables import read_tables, with_values
+from hexapod_cosim.models import HexapodError, Robot, load_robot, robot_from_table
 
 NEEDS_PUBLIC_CALL = pytest.mark.usefixtures("plant_build")
 SHORT = {"duration": 0.3}
@@ -200,6 +202,13 @@ def test_the_pattern_generator_walks_forward_and_turns(plant_build: Path) -> Non
         ({"settings": ["duration=3"]}, "settings: wrong type of an argument: got ['duration=3']"),
         ({"gains": 3}, "gains: wrong type of an argument: got 3"),
         ({"settings": {"duratoin": 3}}, "settings: unknown setting: got 'duratoin'"),
+        ({"settings": {3: 1}}, "settings: wrong type of an argument: got 3"),
+        (
+            {"settings": {"seed": np.int64(-1)}},
+            "walk_flat.toml: seed: out of range: got np.int64(-1)",
+        ),
+        ({"label": 3}, "label: wrong type of an argument: got 3"),
+        ({"fmu": 3}, "fmu: wrong type of an argument: got 3"),
     ],
 )
 def test_arguments_of_another_type_are_refused(arguments: dict[str, Any], where: str) -> None:
@@ -216,6 +225,22 @@ def test_a_report_of_no_result_is_refused(results: Any, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@NEEDS_PUBLIC_CALL
+def test_a_report_in_no_folder_and_a_column_of_no_name_are_refused(runs: list[Result]) -> None:
+    with pytest.raises(HexapodError, match=r"folder: wrong type of an argument: got 'nothing"):
+        hexapod_cosim.report(runs, None)  # type: ignore[arg-type]
+    with pytest.raises(HexapodError, match="column: wrong type of an argument: got 3"):
+        runs[0].recording.column(3)  # type: ignore[arg-type]
+
+
+def test_numbers_of_numpy_are_settings() -> None:
+    chosen = {"seed": np.int64(3), "duration": np.float32(2.0)}
+    table = with_values(read_tables("walk_flat")[0], chosen)
+    plan = scenario_from_table(table, where="walk_flat.toml")
+    assert (plan.seed, type(plan.seed)) == (3, int)
+    assert (plan.duration, type(plan.duration)) == (2.0, float)
+
+
 def test_a_controller_of_no_gait_and_a_robot_of_no_name_are_refused() -> None:
     robot = load_robot("athena")
     with pytest.raises(HexapodError, match="gait: wrong type of an argument"):
@@ -224,3 +249,18 @@ def test_a_controller_of_no_gait_and_a_robot_of_no_name_are_refused() -> None:
         Controller(robot, period="5 ms", gait=make_gait(robot))  # type: ignore[arg-type]
     with pytest.raises(HexapodError, match="path: wrong type of an argument"):
         load_robot(None)  # type: ignore[arg-type]
+    with pytest.raises(HexapodError, match="robot: wrong type of an argument: got 'athena'"):
+        Controller("athena", period=0.005, gait=make_gait(robot))  # type: ignore[arg-type]
+    with pytest.raises(HexapodError, match="robot: wrong type of an argument"):
+        make_gait("athena")  # type: ignore[arg-type]
+    with pytest.raises(HexapodError, match="name: wrong type of an argument: got 3"):
+        make_gait(robot, 3)  # type: ignore[arg-type]
+    with pytest.raises(HexapodError, match="mine: wrong type: got 3, expected a table"):
+        robot_from_table(3, where="mine")  # type: ignore[arg-type]
+
+
+def test_a_step_without_a_command_is_refused() -> None:
+    robot = load_robot("athena")
+    controller = Controller(robot, period=0.005, gait=make_gait(robot))
+    with pytest.raises(HexapodError, match="command: wrong type of an argument: got 'nothing"):
+        controller.step(0.0, None, Measurement())  # type: ignore[arg-type]

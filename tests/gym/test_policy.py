@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -134,10 +136,42 @@ def test_a_saved_policy_is_read_again_and_other_files_are_refused(
     seen = np.ones(INPUTS)
     assert again(seen).tobytes() == policy(seen).tobytes()
     assert (again.robot, again.clock, again.action_scale) == ("athena", 1.5, 0.3)
-    for name, content in {"text.npz": b"policy", "empty.npz": b""}.items():
-        (tmp_path / name).write_bytes(content)
-        with pytest.raises(HexapodError, match="not a policy"):
-            load_policy(tmp_path / name)
+
+
+NONE = "a file that is no archive of numbers"
+
+
+@pytest.mark.parametrize(
+    ("content", "got"),
+    [
+        (b"policy", NONE),
+        (b"", NONE),
+        (np.zeros(3), NONE),
+        (None, "No such file or directory"),
+        ({"hidden_weight": None}, "a file without hidden_weight"),
+        ({"action_bias": "a"}, r"action_bias that is not of finite numbers of shape \(18,\)"),
+        (
+            {"hidden_bias": np.zeros(3)},
+            r"hidden_bias that is not of finite numbers of shape \(16,\)",
+        ),
+        ({"clock": "fast"}, r"clock that is not of finite numbers of shape \(\)"),
+        ({"action_scale": math.nan}, r"action_scale that is not of finite numbers of shape \(\)"),
+    ],
+)
+def test_a_file_that_is_no_policy_is_refused(
+    policy: Policy, tmp_path: Path, content: Any, got: str
+) -> None:
+    path = tmp_path / "x.npz"
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif isinstance(content, np.ndarray):
+        with path.open("wb") as file:
+            np.save(file, content)
+    elif content is not None:
+        changed = {**vars(policy), **content}
+        np.savez(path, **{name: one for name, one in changed.items() if one is not None})
+    with pytest.raises(HexapodError, match=f"x.npz: not a policy: got '{got}', expected"):
+        load_policy(path)
 
 
 def test_training_is_repeatable_and_leaves_the_standing_policy() -> None:

@@ -219,10 +219,30 @@ def test_both_kinds_of_logs_are_read(tmp_path: Path) -> None:
     assert logs[1].voltage == pytest.approx(12.0)
 
 
-def test_a_file_that_is_no_bench_log_is_refused(call: Call, tmp_path: Path) -> None:
-    (tmp_path / "x.json").write_text('{"mass": 1.0}', encoding="utf-8")
-    outcome = call("identify", "servo", tmp_path / "x.json", "-o", tmp_path / "out")
-    assert_refused(outcome, "no log of a servo bench", "'entries'", "BAM or K-Scale")
+@pytest.mark.parametrize(
+    ("content", "got"),
+    [
+        ({"mass": 1.0}, "got 'a file without entries'"),
+        ({"actuator_id": 1}, "got 'a file without entries'"),
+        ({"entries": []}, "got 'a file without motor'"),
+        ({"entries": [{}]}, "got 'a file without timestamp'"),
+        ({"entries": [3]}, "got 'a file that is no such log'"),
+        ([1, 2], "got 'a file that is no such log'"),
+        ("{", "got 'a file that is no such log'"),
+        (b"\xff\xfe", "got 'a file that is no such log'"),
+        (None, "got 'No such file or directory'"),
+    ],
+)
+def test_a_file_that_is_no_bench_log_is_refused(
+    call: Call, tmp_path: Path, content: Any, got: str
+) -> None:
+    path = tmp_path / "x.json"
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif content is not None:
+        path.write_text(content if isinstance(content, str) else json.dumps(content))
+    outcome = call("identify", "servo", path, "-o", tmp_path / "out")
+    assert_refused(outcome, "no log of a servo bench", got, "BAM or K-Scale")
     assert not (tmp_path / "out").exists()
 
 

@@ -187,7 +187,13 @@ def test_a_damaged_file_is_refused(tmp_path: Path, content: bytes) -> None:
 def test_a_cut_file_is_refused(recorded: Path, tmp_path: Path) -> None:
     content = (recorded / "results.mcap").read_bytes()
     (tmp_path / "x.mcap").write_bytes(content[: len(content) // 2])
-    with pytest.raises(HexapodError, match="not an MCAP file of a robot"):
+    said = "not an MCAP file of a robot: got 'a file that is no undamaged MCAP file'"
+    with pytest.raises(HexapodError, match=said):
+        read_mcap(tmp_path / "x.mcap")
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(HexapodError, match=r"no such recording: got '.*x\.mcap'; correct the path"):
         read_mcap(tmp_path / "x.mcap")
 
 

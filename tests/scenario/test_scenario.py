@@ -283,6 +283,14 @@ def test_a_mistake_is_reported_with_what_was_got_and_what_is_allowed(setting: st
         assert part in message
 
 
+@pytest.mark.parametrize("text", ["", "# nothing but a comment\n"])
+def test_a_scenario_file_without_a_key_is_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    said = r"mine\.toml: an empty scenario: expected at least one key; write one, for example"
+    with pytest.raises(ScenarioError, match=said):
+        load_scenario(tmp_path / "mine.toml", overrides=["duration=1"])
+
+
 @pytest.mark.parametrize(
     ("text", "place"),
     [

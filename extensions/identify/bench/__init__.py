@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from hexapod_cosim.cosim.common.files import why_unreadable
 from hexapod_cosim.extensions.identify.bench import bam, kscale
 from hexapod_cosim.extensions.identify.bench.log import BenchLog
 from hexapod_cosim.extensions.identify.log import LogError
@@ -24,7 +25,7 @@ def read_bench_log(path: Path) -> BenchLog:
     except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
         raise LogError(
             "no log of a servo bench",
-            got=f"{type(error).__name__}: {error}",
+            got=why_unreadable(error, "such log"),
             expected="a JSON file of BAM or K-Scale with mass, length, kp and entries",
             fix="name the raw logs, as they were recorded",
             where=str(path),
