@@ -24,6 +24,7 @@ from hexapod_cosim.controller import PATTERNS, BodyCommand, Diagnostics, JointCo
 from hexapod_cosim.cosim.common.files import file_stamp
 from hexapod_cosim.cosim.control.fmu_instance import Block3, ControllerFmu3
 from hexapod_cosim.cosim.interface.descriptions import open_description
+from hexapod_cosim.cosim.interface.names import JOINTS, LEGS, joint_names
 from hexapod_cosim.cosim.master.connection import (
     DIAGNOSED,
     DIAGNOSED_FLAGS,
@@ -36,13 +37,12 @@ from hexapod_cosim.cosim.master.connection import (
 )
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_block import FmuBlock
-from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError
+from hexapod_cosim.models import FmuError
 from hexapod_cosim.models.arrays import Vector3
 
-LEGS, JOINTS = len(LEG_NAMES), len(JOINT_NAMES)
 REFERENCES = 4  # angle, speed, torque, acceleration
 ARRAY = "stance"  # of FMI 3: six legs by three joints
-NAMES = [f"{leg}.{joint}.{ARRAY}" for leg in LEG_NAMES for joint in JOINT_NAMES]
+NAMES = joint_names(ARRAY)
 TIMING = ("gait.pattern", "gait.period", "gait.duty")
 MAX_READ = 32  # files that are kept; the least recently used one goes first
 

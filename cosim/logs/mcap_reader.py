@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.files import why_unreadable
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
@@ -25,10 +24,10 @@ from hexapod_cosim.cosim.logs.mcap_writer import ABOUT, COLUMNS, NANO, OURS
 from hexapod_cosim.cosim.logs.messages import require_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import LEG_NAMES, HexapodError, Robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.kinematics import rotation_matrix
 from hexapod_cosim.models.records import JointNames
 
-Array = NDArray[np.float64]
 COMMAND_WORDS = ("command", "desired", "reference")  # in the name of a topic
 UNIX_TIME = 10**15  # ns    later stamps are Unix times, which count from the first row
 FIELDS = ("position", "velocity", "effort")

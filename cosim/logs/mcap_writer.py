@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
@@ -21,10 +20,10 @@ from hexapod_cosim.cosim.logs import messages as ros
 from hexapod_cosim.cosim.logs.messages import require_mcap
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.kinematics import rotation_matrix
 from hexapod_cosim.models.records import JointNames
 
-Array = NDArray[np.float64]
 Message = dict[str, Any]
 Source = tuple[str, str, Callable[[int, Message], Message]]  # topic, type, message of a row
 NANO = 1_000_000_000

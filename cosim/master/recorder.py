@@ -22,9 +22,9 @@ from hexapod_cosim.cosim.interface.names import (
 )
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.models import HexapodError, ScenarioError, suggestion
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.errors import check_type
 
-Array = NDArray[np.float64]
 BLOCK_ROWS = 500  # that are stored at once
 PEAKS = ("peak_force", "peak_force_rate")  # of a foot, within the last communication step
 LANDING_RATE, LANDINGS = "landing_rate", "landings"

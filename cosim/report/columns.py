@@ -28,8 +28,8 @@ from hexapod_cosim.cosim.results.window import (
     slip_under_load,
 )
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
+from hexapod_cosim.models.arrays import Array
 
-Array = NDArray[np.float64]
 Columns = dict[str, Array]
 
 STEPS = 65535  # of 16 bits

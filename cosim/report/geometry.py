@@ -19,6 +19,7 @@ from hexapod_cosim.cosim.report.columns import pack
 from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.support import FLAT, SLOPE
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.files import parse_toml
 from hexapod_cosim.models.ground.faces import surface_heights
 from hexapod_cosim.models.ground.patches import PROPERTIES
@@ -26,7 +27,6 @@ from hexapod_cosim.models.ground.smooth import RUN_OUT
 from hexapod_cosim.models.ground.surface import LAW, MU, Surface
 
 Parameters = Mapping[str, float]
-Array = NDArray[np.float64]
 
 FLATNESS = 0.25  # height of a torso of unknown size, relative to the width between its hips
 FINE = 0.0125  # m    spacing of the samples of a smooth surface, if it is not too large for it

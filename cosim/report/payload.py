@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hexapod_cosim.cosim.common.control_style import control_styles
-from hexapod_cosim.cosim.report.columns import MOST_ROWS, Array, Columns, choose, pack
+from hexapod_cosim.cosim.report.columns import MOST_ROWS, Columns, choose, pack
 from hexapod_cosim.cosim.report.geometry import (
     describe_ground,
     describe_robot,
@@ -16,6 +16,7 @@ from hexapod_cosim.cosim.report.geometry import (
 )
 from hexapod_cosim.cosim.results.folder import StoredResult
 from hexapod_cosim.cosim.results.window import CONTACT_SHARE
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.ground.surface import Surface
 
 DASH = 1.5  # pixels per point of a dash

@@ -17,7 +17,6 @@ from hexapod_cosim.cosim.report.profile import profile
 from hexapod_cosim.cosim.results.metrics import planned_feet, plans_feet
 from hexapod_cosim.cosim.results.support import body_height, real_feet
 from hexapod_cosim.cosim.results.window import (
-    Array,
     View,
     commanded_path,
     robot_weight,
@@ -25,6 +24,7 @@ from hexapod_cosim.cosim.results.window import (
     slip_under_load,
 )
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
+from hexapod_cosim.models.arrays import Array
 
 PLAN = "0.7"  # grey of planned paths
 PLANNED = "0.85"  # grey of planned swings

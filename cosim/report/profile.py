@@ -9,16 +9,14 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from hexapod_cosim.controller.figure_style import WIDTH
 from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.master.recorder import ColumnError, Recording
 from hexapod_cosim.cosim.results.ground import heights_at
 from hexapod_cosim.cosim.results.window import View
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.ground.surface import Surface
-
-Array = NDArray[np.float64]
 
 SAMPLES = 600  # of the path, at most
 GROUND = "0.35"  # grey of the ground

@@ -26,13 +26,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.results.metric_table import FLOORS, METRICS
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.models import HexapodError
-
-Array = NDArray[np.float64]
+from hexapod_cosim.models.arrays import Array
 
 CONFIDENCE = 0.95
 BETTER, WORSE, SAME = "better", "worse", "same"

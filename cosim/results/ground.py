@@ -8,17 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.support import FLAT, GRID
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.ground.faces import ground_height
 from hexapod_cosim.models.ground.grid_file import read_grid, surface_from_bytes, write_grid
 from hexapod_cosim.models.ground.surface import Surface, Terrain
 from hexapod_cosim.models.ground.table import terrain_specs
 from hexapod_cosim.models.schema import Number
-
-Array = NDArray[np.float64]
 
 GROUND = "ground.terrain"  # the grid file in a folder of results
 MARGIN = 2.75  # m    of the surface around the torso's path

@@ -25,7 +25,6 @@ from hexapod_cosim.cosim.results.metric_table import METRICS, PER_RADIAN
 from hexapod_cosim.cosim.results.support import body_height, real_feet, stability_margins
 from hexapod_cosim.cosim.results.window import (
     CONTACT_SHARE,
-    Array,
     JudgedWindow,
     View,
     bearing_load,
@@ -34,6 +33,7 @@ from hexapod_cosim.cosim.results.window import (
     law_name,
 )
 from hexapod_cosim.models import LEG_NAMES, Friction, Servo
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.friction import yielding_velocity
 from hexapod_cosim.models.measure import CONE_BINS, CONE_STARTS
 

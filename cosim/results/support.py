@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, TERRAINS
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.kinematics import unit_rotation
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 ROWS_AT_ONCE = 4096  # bounds the memory of the pairs of feet
 COINCIDENT = 1e-9  # m    feet closer than this make no edge

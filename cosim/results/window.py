@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Recording
 from hexapod_cosim.models import FRICTION_LAWS
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.friction import LAWS, FrictionLaw
 from hexapod_cosim.models.ground.surface import Surface
-
-Array = NDArray[np.float64]
 
 SKIPPED_CYCLES = 2  # the start is not yet a steady walk
 CONTACT_SHARE = 0.01  # of the weight: a foot with less load does not stand

@@ -8,7 +8,6 @@ from dataclasses import astuple, fields
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Controller, Gait
 from hexapod_cosim.controller.plane import LEGS, cis
@@ -17,8 +16,7 @@ from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.controller.walk.swing import Twist, travel
 from hexapod_cosim.cosim.scenario.records import Command
 from hexapod_cosim.models import Robot, ScenarioError
-
-Array = NDArray[np.float64]
+from hexapod_cosim.models.arrays import Array
 
 NAMES = tuple(item.name for item in fields(BodyCommand))
 UNITS = ("m/s", "m/s", "rad/s", "m", "rad", "rad")

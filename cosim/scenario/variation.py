@@ -8,15 +8,13 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import JOINTS, LEGS, joint_names, vector_names
 from hexapod_cosim.cosim.scenario.records import Command, Variation
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.ground.faces import ground
 from hexapod_cosim.models.kinematics import foot_positions, quaternion_product, rotation_matrix
-
-Array = NDArray[np.float64]
 
 STREAM = 1  # of random numbers; the noise of the sensors is drawn from the seed alone
 POSITION, QUATERNION = vector_names("initial.position"), vector_names("initial.quaternion", 4)

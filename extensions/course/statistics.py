@@ -17,11 +17,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.results.comparison import CONFIDENCE
-
-Array = NDArray[np.float64]
+from hexapod_cosim.models.arrays import Array
 
 DRAWS = 2000  # of the bootstrap
 STREAM = 18  # of its random numbers

@@ -10,7 +10,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.results.comparison import Change, change_of, half_width_of
 from hexapod_cosim.cosim.results.metric_table import FLOORS
@@ -19,8 +18,7 @@ from hexapod_cosim.cosim.scenario.records import CHOSEN
 from hexapod_cosim.extensions.course.records import BY_NAME, QUANTITIES, Case, Course
 from hexapod_cosim.extensions.course.runs import Run
 from hexapod_cosim.extensions.course.statistics import Interval, Rate, median_ratio
-
-Array = NDArray[np.float64]
+from hexapod_cosim.models.arrays import Array
 
 ALL = "all"  # the class of all cases
 LEAST_SHARE = 0.5  # of the pairs of a case that must be successes for its ratio to count

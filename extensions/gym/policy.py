@@ -24,8 +24,8 @@ from hexapod_cosim.cosim.interface.plant import expand_interface
 from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.extensions.gym.settings import BLOCKS, JOINTS, MEASURABLE, RATE, EnvSettings
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, Robot, load_robot
+from hexapod_cosim.models.arrays import Array
 
-Array = NDArray[np.float64]
 INPUTS = sum(BLOCKS[name] for name in MEASURABLE)  # 29
 HIDDEN = 16
 HALF_HIDDEN, HALF_JOINTS = HIDDEN // 2, JOINTS // 2

@@ -14,15 +14,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.gym.batch import Batch
 from hexapod_cosim.extensions.gym.checks import check_count, check_seeds
 from hexapod_cosim.extensions.gym.policy import FREE, FREE_SIZE, INPUTS, Policy, symmetric_weights
 from hexapod_cosim.extensions.gym.settings import MEASURABLE, EnvSettings, Positive
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.schema import check_record
 
-Array = NDArray[np.float64]
 FIRST, SECOND, TINY = 0.9, 0.99, 1e-8  # of Adam
 # weights of the reward: velocity along the command first, then what keeps the walk smooth
 WALKING = {

@@ -9,7 +9,6 @@ from functools import lru_cache
 from types import SimpleNamespace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.components import PLANT
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
@@ -20,9 +19,9 @@ from hexapod_cosim.extensions.identify.plant import LogPlant
 from hexapod_cosim.extensions.identify.start import initial_state
 from hexapod_cosim.extensions.identify.unknowns import CURRENT, DELAYS, changed_robot
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.kinematics import axis_quaternion, quaternion_product, rotation_matrix
 
-Array = NDArray[np.float64]
 PLACE, TURN = vector_names("initial.position"), vector_names("initial.quaternion", 4)
 JOINTS = [name.removesuffix(".angle") for name in joint_names("angle")]
 # start values of a pose, which a log replaces

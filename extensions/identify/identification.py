@@ -8,7 +8,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant import export_fmu
@@ -35,9 +34,8 @@ from hexapod_cosim.extensions.identify.screening import BadColumn, screened
 from hexapod_cosim.extensions.identify.start import rest_rows
 from hexapod_cosim.extensions.identify.unknowns import GROUPS, START, changed_robot, chosen_unknowns
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.arrays import Array
 
-Array = NDArray[np.float64]
-QUANTILE = 1.959963985  # of a normal distribution, for 95 %
 FEWEST_DIGITS = 5  # of a value and its interval in texts
 
 
@@ -97,7 +95,7 @@ class Identified:
         before, kept = self.fit.before[row.key], bool(self.fit.kept[k])
         value = before if kept else self.fit.values[row.key]  # the file's to the last digit
         deviation = self.fit.deviations[row.key]
-        low, high = row.interval(value, QUANTILE * deviation)
+        low, high = row.interval(value, deviation)
         return Estimate(
             key=row.key,
             unit=row.unit,

@@ -13,7 +13,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import (
     foot_names,
@@ -26,8 +25,8 @@ from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.columns import known_columns, plant_variables
 from hexapod_cosim.cosim.results.recordings import read_csv, read_parquet
 from hexapod_cosim.models import HexapodError, Robot
+from hexapod_cosim.models.arrays import Array
 
-Array = NDArray[np.float64]
 LEAST_ROWS = 10
 HELD_OUT = 0.25  # share of each log at its end that a fit does not see
 LONGEST_STEP = 0.2  # s    between two rows

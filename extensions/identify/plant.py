@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.temporary import Closing
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.extensions.identify.log import Log, LogError
 from hexapod_cosim.models import FmuError
+from hexapod_cosim.models.arrays import Array
 
-Array = NDArray[np.float64]
 # time [s], whether it is a command, row of the log, which of the delays
 Event = tuple[float, bool, int, int]
 SAME_TIME = 1e-9  # s    events closer than this are one

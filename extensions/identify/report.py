@@ -11,16 +11,15 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.controller.figure_style import PALETTE, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.extensions.identify.log import CHANNELS, Channel, Log, channel_of
+from hexapod_cosim.models.arrays import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-Array = NDArray[np.float64]
 TITLES = {channel.key: channel.title for channel in CHANNELS}
 COLUMNS = ("channel", "unit", "columns", "spread", "rms error", "largest error", "in", "at [s]")
 MOST_POINTS = 600  # of a line

@@ -10,12 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.identify.experiment import Experiment
 from hexapod_cosim.extensions.identify.log import CHANNELS, channel_of
+from hexapod_cosim.models.arrays import Array
 
-Array = NDArray[np.float64]
 MOST_MISSING = 0.1  # of the rows
 LONGEST_STUCK = 0.1  # of the rows
 MOVES = 0.2  # of a column's spread: what a simulation changes while a reading is stuck

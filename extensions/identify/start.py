@@ -9,16 +9,15 @@ found by its comparison with the simulation instead of preventing it.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import LEGS, joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.extensions.identify.log import ATTITUDE, Log
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.kinematics import axis_quaternion, foot_positions, quaternion_product
 from hexapod_cosim.models.kinematics import rotation_matrix as rotation
 
-Array = NDArray[np.float64]
 LONGEST_REST = 0.5  # s    of rest that is averaged
 FARTHEST = 0.5  # rad    of a joint from its command; a servo under load sags by some 0.1 rad
 RATES = {  # quantity of the log: initial value of the FMU

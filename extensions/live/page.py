@@ -21,6 +21,7 @@ from hexapod_cosim.cosim.scenario.reading import scenario_robot
 from hexapod_cosim.extensions.live.robot import LiveRobot
 from hexapod_cosim.extensions.live.settings import FLAT, OWN, Choices
 from hexapod_cosim.models import LEG_NAMES, HexapodError, Robot
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.table import CATALOGUE
 
@@ -31,7 +32,6 @@ ABOUTS = {
     "compliant": "Plans the forces of the feet and commands torques: softer landings, less slip.",
 }
 
-Array = NDArray[np.float64]
 
 DIGITS = 5  # of positions [m], angles [rad] and shares
 SHOWN = {  # variables of the plant by key of a frame

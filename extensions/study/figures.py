@@ -16,7 +16,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from hexapod_cosim.controller.figure_style import SETTINGS
 from hexapod_cosim.cosim.common.control_style import control_styles
@@ -24,8 +23,8 @@ from hexapod_cosim.cosim.report.figures import Figures, figure_files, write_figu
 from hexapod_cosim.cosim.results.metric_table import FLOORS, METRICS
 from hexapod_cosim.extensions.study.records import GRID, Factor, Study, shown_value
 from hexapod_cosim.extensions.study.summary import Point, Results
+from hexapod_cosim.models.arrays import Array
 
-Array = NDArray[np.float64]
 SLIP = "slip_per_metre"
 MAX_CELLS = 40  # more make a figure slower and no clearer
 MAX_PANELS, COLUMNS = 9, 3  # panels, and panels side by side

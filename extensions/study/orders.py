@@ -13,7 +13,6 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.study.factors import at_quantile
 from hexapod_cosim.extensions.study.records import (
@@ -27,9 +26,9 @@ from hexapod_cosim.extensions.study.records import (
     Study,
     Value,
 )
+from hexapod_cosim.models.arrays import Array
 
 STREAM = 2  # of random numbers of the study's seed; scenarios use the streams 0 and 1
-Array = NDArray[np.float64]
 
 
 def points_of(study: Study) -> Callable[[int], tuple[Value, ...]]:

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.files import write_json
 from hexapod_cosim.cosim.results.comparison import change_of
@@ -27,9 +26,9 @@ from hexapod_cosim.extensions.study.orders import STREAM, trial_orders
 from hexapod_cosim.extensions.study.records import WALKED, Optimise, Order, Study
 from hexapod_cosim.extensions.study.store import FIGURES
 from hexapod_cosim.extensions.study.summary import Runs
+from hexapod_cosim.models.arrays import Array
 
 WORST = 1e9  # cost of a trial that breaks a constraint, to which its excess is added
-Array = NDArray[np.float64]
 Trial = dict[str, Any]  # number, values by variable, means by metric, whether it is feasible, cost
 
 

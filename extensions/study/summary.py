@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.files import RUN_FILE, read_json, write_json
 from hexapod_cosim.cosim.results.comparison import Change, change_of, half_width_of
@@ -27,13 +26,13 @@ from hexapod_cosim.extensions.study.folder import MANIFEST, OPTIMUM
 from hexapod_cosim.extensions.study.reading import study_from_table
 from hexapod_cosim.extensions.study.records import SCENARIO_FACTOR, Study
 from hexapod_cosim.extensions.study.store import FIGURES, WARNING_SEPARATOR, Store, quoted
+from hexapod_cosim.models.arrays import Array
 
 SUMMARY = "summary.json"
 POINT_METRICS = ("slip_per_metre", "cost_of_transport", "peak_force", "torque_rms")
 MAX_POINTS = 4000  # kept for figures and tables; evenly chosen if there are more
 MAX_REASONS = 30  # that are shown
 NUMBER = re.compile(r"[0-9#]+(?:\.[0-9#]+)?")
-Array = NDArray[np.float64]
 ALL_PAIRS = slice(None)
 
 

@@ -23,7 +23,8 @@ from hexapod_cosim.extensions.identify.fitting.least_squares import (
     remaining_step,
 )
 from hexapod_cosim.extensions.identify.fitting.misfit import determined, sharpened, to_keep
-from hexapod_cosim.extensions.identify.identification import QUANTILE, Estimate
+from hexapod_cosim.extensions.identify.identification import Estimate
+from hexapod_cosim.extensions.identify.numbers import QUANTILE
 
 Array = NDArray[np.float64]
 ROWS, COLUMNS, RUNS = 240, 6, 200

@@ -10,7 +10,8 @@ from scipy.optimize import root
 from secret_robots import secret_robot
 
 from hexapod_cosim.extensions.identify.fitting.least_squares import ENOUGH
-from hexapod_cosim.extensions.identify.identification import QUANTILE, identify
+from hexapod_cosim.extensions.identify.identification import identify
+from hexapod_cosim.extensions.identify.numbers import QUANTILE
 from hexapod_cosim.extensions.identify.results import warnings
 from hexapod_cosim.extensions.identify.start import standing_attitude
 from hexapod_cosim.models import Robot, load_robot

@@ -22,7 +22,7 @@ from native_walks import (
     uneven,
 )
 
-from hexapod_cosim.controller import Controller, Measurement, Parts
+from hexapod_cosim.controller import BodyCommand, Controller, Measurement, Parts
 
 NO_FALLBACK = replace(ALL_PARTS, fallback=False)
 
@@ -149,6 +149,30 @@ def test_feet_that_find_no_ground_are_awaited_at_the_same_step(
     worst, _ = differences(controller_core, setup_of(gait=gait), sense=sense)
     assert close(worst)
     assert 0.02 < np.mean(sense.waiting) < 0.8
+
+
+@pytest.mark.parametrize(("lost", "awaited"), [([1], True), ([1, 4], False)])
+def test_feet_are_awaited_without_one_leg_but_not_without_two(
+    controller_core: ct.CDLL, lost: list[int], awaited: bool
+) -> None:
+    """The joints of the lost legs rest from 1.5 s on."""
+    low, absent = LowGround(), []
+
+    def sense(controller: Controller, step: int, measurement: Measurement) -> None:
+        resting = measurement.angle[lost].copy()
+        low(controller, step, measurement)
+        if step >= 300:
+            measurement.angle[lost] = resting
+        absent.append(np.flatnonzero(controller.diagnostics.absent).tolist())
+
+    straight = BodyCommand(vx=0.04)
+    worst, _ = differences(
+        controller_core, setup_of(), sense=sense, steps=1200, command_at=lambda _: straight
+    )
+    assert close(worst)
+    waited = [waits for waits, legs in zip(low.waiting, absent, strict=True) if legs == lost]
+    assert len(waited) > 600
+    assert any(waited) is awaited
 
 
 @pytest.mark.parametrize("speed_max", [3.0, 2.6])

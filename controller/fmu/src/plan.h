@@ -130,14 +130,13 @@ static inline void follow_sensors(const hxWalkPlanModel *model, const hxComplian
 }
 
 /* Returns whether the gait clock waits for feet at the ends of their swings (C50). It does not
- * without a leg, because a foot may then have no load to carry. */
+ * without two legs, because a foot may then have no load to carry. */
 static inline int waits(const hxWalkPlanModel *model, const hxCompliant *compliant,
                         const hxWalkPlan *plan) {
   const hxGaitClock *clock = &plan->paths.clock;
-  int landing[HX_LEGS];
-  if (!model->planner.is_compliant) return 0;
-  for (int k = 0; k < HX_LEGS; ++k)
-    if (clock->absent[k]) return 0;
+  int landing[HX_LEGS], absent = 0;
+  for (int k = 0; k < HX_LEGS; ++k) absent += clock->absent[k];
+  if (!model->planner.is_compliant || absent > 1) return 0;
   hx_gait_clock_landing(&model->paths.clock, clock, plan->at, landing);
   return hx_force_laws_waits(&model->planner.compliant.laws, landing, clock->waiting,
                              &compliant->laws);

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.identify.bench.fit import ServoFit
 from hexapod_cosim.extensions.identify.bench.log import BenchLog
 from hexapod_cosim.extensions.identify.bench.pendulum import Bench, Swing
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.servos.motor import torque_per_volt
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

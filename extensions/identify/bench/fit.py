@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.identify.bench.log import BenchLog
 from hexapod_cosim.extensions.identify.bench.pendulum import STEP, Bench, Swing, stacked
@@ -15,8 +14,8 @@ from hexapod_cosim.extensions.identify.fitting.least_squares import damped_step,
 from hexapod_cosim.extensions.identify.numbers import Unknown, section
 from hexapod_cosim.extensions.identify.numbers.servo import SERVO, with_friction_model
 from hexapod_cosim.models import Robot
+from hexapod_cosim.models.arrays import Array
 
-Array = NDArray[np.float64]
 # rad  of an angle, some encoder steps: nearly all residuals count linearly, as in the errors that
 # a fit is judged by; with squares few long deviations of one log would choose the servo
 NOISE = 0.004
@@ -29,7 +28,6 @@ ENOUGH = 2e-4  # relative change of the sum of squares at which a search ends
 STAGES = ((0.005, 25), (0.003, 40), (STEP, 2))
 SEEDS = 3  # starts of the search
 SPREAD = 1.0  # priors  of the further starts
-QUANTILE = 1.959963985  # of a normal distribution, for 95 %
 OFFSET, DELAY = "bench.offset", "bench.delay"
 BENCH = (
     Unknown(key=OFFSET, unit="rad", group="bench", prior=0.03, positive=False),
@@ -62,7 +60,7 @@ class ServoFit:
     def interval(self, key: str) -> tuple[float, float]:
         """Returns the 95 % interval of a number."""
         k = [row.key for row in self.rows].index(key)
-        return self.rows[k].interval(self.values[key], QUANTILE * float(self.deviations[k]))
+        return self.rows[k].interval(self.values[key], float(self.deviations[k]))
 
     def swing(self, bench: Bench) -> Swing:
         """Simulates the servo on the benches of logs."""

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.extensions.identify.bench.log import SPEED_DELAY, Array, BenchLog, column
+from hexapod_cosim.extensions.identify.bench.log import SPEED_DELAY, BenchLog, column
+from hexapod_cosim.models.arrays import Array
 
 # duty for each radian of position error and unit of the gain register, as K-Scale measured it
 GAINS = {"sts3215": 0.164890901, "sts3250": 0.16382926}

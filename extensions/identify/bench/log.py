@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hexapod_cosim.models.arrays import Array
+
 # s  by which servos report their speed late, a mean over 40 ms: the angles of the same logs of an
 # XL330, a STS3215 and a STS3250 change by it at this delay
 SPEED_DELAY = 0.020

@@ -12,10 +12,10 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.identify.bench.log import BenchLog
 from hexapod_cosim.models.actuator import servo_torque
+from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.servos.motor import (
     Power,
@@ -26,7 +26,6 @@ from hexapod_cosim.models.servos.motor import (
     position_gain,
 )
 
-Array = NDArray[np.float64]
 GRAVITY = 9.80665  # m/s2
 STEP = 0.0015  # s  about
 NEWTON = 2  # iterations for the speed at the end of a step

@@ -21,7 +21,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hexapod_cosim.models.arrays import Array
+
 ORDINATES = 40  # of periodograms, at least about, whose mean is the spectrum at a frequency
 LEAST_LEFT = 0.1  # share of a frequency that the fit is taken to leave, at least
 NEGLIGIBLE = 1e-6  # information [1/prior^2]

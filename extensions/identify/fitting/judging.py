@@ -29,8 +29,8 @@ from hexapod_cosim.extensions.identify.fitting.problem import Problem
 from hexapod_cosim.extensions.identify.fitting.search import finished, searched
 from hexapod_cosim.extensions.identify.numbers import Unknown
 from hexapod_cosim.extensions.identify.unknowns import OF_FILE
+from hexapod_cosim.models.arrays import Array
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Progress = Callable[[str], None]
 # of deriving weak combinations anew: the first errors of derivatives hide some in others

@@ -9,9 +9,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hexapod_cosim.models.arrays import Array
+
 BOUND = 3.0  # deviations
 
 

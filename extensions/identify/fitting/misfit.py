@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from hexapod_cosim.extensions.identify.experiment import Experiment
 from hexapod_cosim.extensions.identify.fitting.least_squares import UNLIKE
 from hexapod_cosim.extensions.identify.fitting.problem import Problem
+from hexapod_cosim.models.arrays import Array
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 SMALLEST = 1e-9  # noise, in the units of the channels
 CLIPPED = 5.0  # deviations    of a residual in the test whether the model explains the log

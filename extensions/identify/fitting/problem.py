@@ -33,8 +33,8 @@ from hexapod_cosim.extensions.identify.numbers import Unknown
 from hexapod_cosim.extensions.identify.plant import LogPlant
 from hexapod_cosim.extensions.identify.unknowns import is_delay
 from hexapod_cosim.models import FmuError, Robot
+from hexapod_cosim.models.arrays import Array
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 ALL = tuple(channel.key for channel in CHANNELS)
 TO_DEVIATION = 1.4826  # from the median of absolute values, of a normal distribution

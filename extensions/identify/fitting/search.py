@@ -14,14 +14,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.extensions.identify.fitting.least_squares import FINE, huber, minimised, stepped
 from hexapod_cosim.extensions.identify.fitting.misfit import read_noise
 from hexapod_cosim.extensions.identify.fitting.problem import Problem
 from hexapod_cosim.extensions.identify.unknowns import DELAYS
+from hexapod_cosim.models.arrays import Array
 
-Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 COARSE = {"solver.tolerance": 1e-4}  # of the search: its errors are far below the readings' noise
 SEARCHED = 40_000  # residuals of the search, about

@@ -13,6 +13,7 @@ from typing import Any
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.servos.presets import followed
 
+QUANTILE = 1.959963985  # of a normal distribution, for 95 %
 ALWAYS: Callable[[Robot], bool] = lambda _robot: True  # noqa: E731
 
 
@@ -47,8 +48,8 @@ class Unknown:
         return min(max(own / self.prior, low), high)
 
     def interval(self, value: float, deviation: float) -> tuple[float, float]:
-        """Returns value -+ a deviation in units of the prior."""
-        half = self.prior * deviation
+        """Returns the interval of 95 % for a standard deviation in units of the prior."""
+        half = self.prior * (QUANTILE * deviation)
         if self.positive:
             return value * math.exp(-half), value * math.exp(half)
         return value - half, value + half
