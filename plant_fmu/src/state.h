@@ -109,7 +109,22 @@ typedef struct hxModel {
                                        *    tibia or torso */
   double radius[HX_ROWS];             /* m  those of knee and shank are also of femur and tibia;
                                        *    those of pairs are sums */
-  /* robot.c: the rows of contacts that are computed, and the ground */
+  double ground_point[3];             /* m  of the plane */
+  double ground_normal[3];            /* 1 */
+  /* laws.c: gravity and constraints */
+  double gravity[3];  /* m/s2 */
+  double alpha, beta; /* 1/s  Baumgarte's (eq. 7) */
+  /* laws.c: what is computed, by which law. All choices lie between the numbers (tangent.h). */
+  int contact_law, friction_law, terrain_kind, servo_mode, servo_drive; /* of their enumerations */
+  int method, projection;
+  int velocity_terms;               /* 1: the tanh law has static friction or a viscous part */
+  int spin_friction, roll_friction; /* 1: the feet resist spin, rolling */
+  int stops;                        /* bits: 1: the joints have stops, 2: some are locked */
+  int measured_friction;            /* 1: the gears have more than Coulomb friction */
+  int stribeck;                     /* 1: it has Stribeck terms */
+  int spin;                         /* 1: the rotors have angular momentum (eq. 54) */
+  int has_soil; /* 1: the ground may be soil, of the definition or of a material of the terrain */
+  /* robot.c: the rows of contacts that are computed, and the terrain */
   int rows;         /* on tibias, those on feet included */
   int foot_rows;    /* on feet */
   int torso_rows;   /* on the torso: 0 or 1 */
@@ -120,21 +135,7 @@ typedef struct hxModel {
     const hxTerrain *terrain; /* NULL: plane; not saved */
     int64_t terrain_bits;     /* the same size on every machine */
   };
-  double ground_point[3];  /* m */
-  double ground_normal[3]; /* 1 */
-  /* laws.c: what is computed, by which law */
-  int contact_law, friction_law, terrain_kind, servo_mode, servo_drive; /* of their enumerations */
-  int method, projection;
-  int velocity_terms;               /* 1: the tanh law has static friction or a viscous part */
-  int spin_friction, roll_friction; /* 1: the feet resist spin, rolling */
-  int stops;                        /* bits: 1: the joints have stops, 2: some are locked */
-  int measured_friction;            /* 1: the gears have more than Coulomb friction */
-  int stribeck;                     /* 1: it has Stribeck terms */
-  int spin;                         /* 1: the rotors have angular momentum (eq. 54) */
-  int has_soil; /* 1: the ground may be soil, of the definition or of a material of the terrain */
-  /* laws.c: contact and constraints */
-  double gravity[3];                  /* m/s2 */
-  double alpha, beta;                 /* 1/s  Baumgarte's (eq. 7) */
+  /* laws.c: contact */
   double stiffness;                   /* N/m^1.5  K of eq. 14 */
   double damping_scale;               /* s/m or 1  d of eq. 14, or d times the impact speed */
   double impact_speed_floor;          /* m/s  the least by which the scale is divided */
