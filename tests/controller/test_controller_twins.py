@@ -85,6 +85,7 @@ def test_each_equation_is_cited_and_each_citation_exists(folder: Path, kind: str
 
 MOST_FILES = 6  # that are written by hand and name a part, of code and pages
 # what names a part in code besides its switch: modules, structures, functions, gains of its own
+# (of [support] the hand-over: its filters' times are also those of other parts)
 HOLD = r"walk\.hold|\bHold\b|hx_hold_|hxHold|HoldGains|/hold\.h|gains\.hold\b"
 NAMES = {
     "support": r"comply\.support|\bSupport\b|hx_support_|hxSupport|/support\.h|handover_time",
