@@ -206,7 +206,7 @@ typedef struct hxContactState {
   /* m  depth at which feet touch soil: z_p, or that of the footprint above which one is; 0 on
    *    rigid ground */
   double plastic[HX_SLOTS];
-  double place[2][HX_SLOTS];   /* m  x and y where they left the bottom of that print */
+  double place[2][HX_SLOTS];   /* m  x and y where they left that footprint's bottom */
   double cell[2][HX_SLOTS];    /* 1    blocks: column and row over which a foot is; < 0: not held */
   double nearest[2][HX_SLOTS]; /* m  smooth grids: x and y from a foot's centre to the point nearest
                                 *    to it at the start of a step, where the search for that point
