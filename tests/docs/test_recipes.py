@@ -70,10 +70,8 @@ FRICTION = {  # file -> text, and what the reader of the recipe writes below it
             "  case HX_FRICTION_NONE:\n    return hx_splat(0.0);\n",
             "  case HX_FRICTION_RATIONAL:\n"
             "    return model->slope / (1.0 + model->slope * speed);\n",
-        )
-    ],
-    "plant_fmu/src/state.h": [
-        ("[HX_FRICTION_LUGRE] = {1, 1},\n", "[HX_FRICTION_RATIONAL] = {1, 0},\n")
+        ),
+        ("[HX_FRICTION_LUGRE] = {1, 1},\n", "[HX_FRICTION_RATIONAL] = {1, 0},\n"),
     ],
     "plant_fmu/interface.toml": [
         (
@@ -154,7 +152,7 @@ def compiled_drag(copy: Path, *, law: int, slope: float, speed: float) -> float:
         "  static hxModel model;\n"
         "  model.friction_law = law, model.slope = slope;\n"
         "  double drag[HX_LANES];\n"
-        "  hx_store(drag, hx_friction(&model, hx_splat(speed)));\n"
+        "  hx_store(drag, hx_friction_direction(&model, hx_splat(speed)));\n"
         "  return drag[0];\n}\n",
         encoding="utf-8",
     )

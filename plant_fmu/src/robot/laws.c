@@ -7,9 +7,9 @@
 #include "../contact_law.h"
 #include "../ground/soil.h"
 #include "../ground/surface.h"
+#include "../lanes/friction.h"
 
-static const double load_share =
-    0.01; /* 1  of the robot's weight; feet with a larger load count their slip */
+static const double load_share = 0.01; /* 1  of the weight; feet with more count their slip */
 
 double hx_weight(const hxDefinition *d) {
   double mass = d->torso.mass;

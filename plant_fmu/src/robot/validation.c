@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "../lanes/friction.h"
 #include "hexapod/message.h"
 #include "hexapod/range_check.h"
 
