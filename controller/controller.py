@@ -11,6 +11,7 @@ Kinematic control is the first line alone: it uses no measurement.
 
 from __future__ import annotations
 
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -62,6 +63,7 @@ class Controller(Stateful):
         law: str = "compliant",
     ) -> None:
         check_type(robot, Robot, "a Robot, as of load_robot()", where="robot")
+        check_type(gains, (Gains, NoneType), "Gains, as of load_gains()", where="gains")
         check_period(period, gait)
         check_law(law)
         self.robot, self.period, self.gains, self.parts = robot, period, gains, parts

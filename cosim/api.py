@@ -138,7 +138,6 @@ def report(results: Result | Sequence[Result], folder: str | Path) -> Path:
         )
     ]
     path = Path(folder)
-    path.parent.mkdir(parents=True, exist_ok=True)
     if len(runs) == 1:
         with results_folder(path) as place:
             place.begin()

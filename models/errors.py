@@ -159,7 +159,7 @@ def unknown_name(
     The message lists the valid names and proposes the most similar one.
     """
     names = list(valid)
-    fix = suggestion(name, names, otherwise="write one of these names")
+    fix = suggestion(str(name), names, otherwise="write one of these names")
     return error(
         f"unknown {kind}", got=name, expected=f"one of {', '.join(names)}", fix=fix, where=where
     )

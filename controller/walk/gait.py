@@ -9,6 +9,8 @@ here into the order LF LM LR RF RM RR.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
+from types import NoneType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +72,7 @@ class Gait:
             ("duty", self.duty, 0.0, 1.0),
             ("step_height", self.step_height, 0.0, np.inf),
         ):
+            check_type(value, Real, "a number", where=name)
             if not low < value < high:
                 raise HexapodError(
                     "impossible gait",
@@ -131,6 +134,7 @@ def make_gait(
     check_type(name, str, "the name of a gait", where="name")
     if name not in PATTERNS:
         raise unknown_name("gait", name, GAITS)
+    check_type(duty, (Real, NoneType), "a number", where="duty")
     if duty is None:
         duty = robot.gait.duty if name == robot.gait.name else PATTERNS[name].duty
     swing_time = robot.gait.period * (1.0 - robot.gait.duty)

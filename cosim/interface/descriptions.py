@@ -50,9 +50,10 @@ def open_description(path: Path) -> Any:
     try:
         description = read_model_description(path, validate=False)
     except Exception as error:
+        of_python = isinstance(error, TypeError | AttributeError | ValueError | LookupError)
         raise FmuError(
             "the FMU's modelDescription.xml cannot be read",
-            got=str(error),
+            got="missing or wrong attributes" if of_python else str(error),
             expected="XML after the standard's schema",
             fix=FIX,
             where=str(path),

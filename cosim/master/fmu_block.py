@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import count
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -115,14 +116,15 @@ def parameter_number(variable: Any, value: Any) -> float:
         if value not in items:
             raise unknown_name(f"choice for {variable.name}", value, items, error=FmuError)
         return int(items[value])
-    if not isinstance(value, int | float):
+    flag = isinstance(value, bool) and variable.type == "Real"
+    if flag or not isinstance(value, Real):  # NumPy's numbers as well
         raise FmuError(
             f"parameter {variable.name} is refused",
             got=value,
             expected=f"a number [{variable.unit or '1'}]",
             fix="give a number",
         )
-    return value
+    return float(value)
 
 
 class FmuLog:

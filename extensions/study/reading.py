@@ -58,6 +58,8 @@ def load_study(path_or_name: str | Path, *, controls: Sequence[str] = ()) -> Stu
     with reading_toml(path, kind="study", name="the study", names=list_studies, error=StudyError):
         table = parse_toml(read_text(path))
     where = path.name if path in bundled.values() else str(path)
+    what, fix = "an empty study", 'write one, for example scenario = "walk_flat"'
+    require(bool(table), None, "at least one key", where, what=what, fix=fix)
     return study_from_table(table, where=where, folder=path.parent, controls=controls)
 
 

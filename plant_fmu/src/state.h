@@ -51,9 +51,9 @@ enum { HX_R = 0, HX_P = 3, HX_V = 7, HX_W = 10 };
 typedef union hxPlantMotion {
   double y[HX_MOTION_SIZE];
   struct {
-    double torso[HX_BODY_STATE];
+    double torso[HX_BODY_STATE];                 /* m, 1, m/s, rad/s  r, p, v, w in world axes */
     double actuator_work, push_work, dissipated; /* J */
-    double link[HX_JOINTS][HX_BODY_STATE][HX_SLOTS];
+    double link[HX_JOINTS][HX_BODY_STATE][HX_SLOTS]; /* as the torso's */
     double bristle[3][HX_SLOTS]; /* m  b of eq. 16, world axes; other laws skip it */
   };
 } hxPlantMotion;
@@ -68,13 +68,13 @@ typedef struct hxStops {
  * child. In the model and in the motion the child's axes are the joint's: x = a, y = b, z = s, so
  * that its rotation matrix contains the vectors that the constraint needs. */
 typedef struct hxJointModel {
-  double mass[HX_SLOTS];
-  double inertia[6][HX_SLOTS]; /* child's axes */
-  double s_i[3][HX_SLOTS];     /* joint axis, parent's axes */
-  double point_i[3][HX_SLOTS]; /* parent's centre of mass to the joint's point, parent's axes */
-  double point_j[3][HX_SLOTS]; /* child's centre of mass to the joint's point, child's axes */
-  double zero[4][HX_SLOTS];    /* rotation from parent's to child's axes at angle 0 */
-  double frame[4][HX_SLOTS];   /* rotation from link axes of hexapod.h to child's axes */
+  double mass[HX_SLOTS];       /* kg */
+  double inertia[6][HX_SLOTS]; /* kg m2  child's axes */
+  double s_i[3][HX_SLOTS];     /* 1  joint axis, parent's axes */
+  double point_i[3][HX_SLOTS]; /* m  parent's centre of mass to the joint's point, parent's axes */
+  double point_j[3][HX_SLOTS]; /* m  child's centre of mass to the joint's point, child's axes */
+  double zero[4][HX_SLOTS];    /* 1  rotation from parent's to child's axes at angle 0 */
+  double frame[4][HX_SLOTS];   /* 1  rotation from link axes of hexapod.h to child's axes */
   hxStops stop, own_stop;      /* those in force, and those of the robot, without locks */
 } hxJointModel;
 
@@ -86,73 +86,86 @@ typedef struct hxHeat {
 } hxHeat;
 
 typedef struct hxModel {
-  double torso_mass;
-  double torso_inertia[6];
+  /* robot.c, bodies.c: masses and points, in the axes of the body's state */
+  double torso_mass;       /* kg */
+  double torso_inertia[6]; /* kg m2 */
   hxJointModel joint[HX_JOINTS];
   double point[HX_ROWS][3][HX_SLOTS]; /* m  centres of contacts' spheres from the centre of mass of
-                                       *    tibia or torso, in the axes of that body's state */
+                                       *    tibia or torso */
   double radius[HX_ROWS];             /* m  those of knee and shank are also of femur and tibia;
                                        *    those of pairs are sums */
-  double gravity[3];
-  double alpha, beta; /* Baumgarte */
-  int contact_law, friction_law, terrain_kind, servo_mode, method, projection;
+  double ground_point[3];             /* m  of the plane */
+  double ground_normal[3];            /* 1 */
+  /* laws.c: gravity and constraints */
+  double gravity[3];  /* m/s2 */
+  double alpha, beta; /* 1/s  Baumgarte's (eq. 7) */
+  /* laws.c: what is computed, by which law. All choices lie between the numbers (tangent.h). */
+  int contact_law, friction_law, terrain_kind, servo_mode, servo_drive; /* of their enumerations */
+  int method, projection;
   int velocity_terms;               /* 1: the tanh law has static friction or a viscous part */
   int spin_friction, roll_friction; /* 1: the feet resist spin, rolling */
   int stops;                        /* bits: 1: the joints have stops, 2: some are locked */
-  int servo_drive;                  /* hxServoDrive */
   int measured_friction;            /* 1: the gears have more than Coulomb friction */
   int stribeck;                     /* 1: it has Stribeck terms */
   int spin;                         /* 1: the rotors have angular momentum (eq. 54) */
-  int has_soil;   /* 1: the ground may be soil, of the definition or of a material of the terrain */
-  int rows;       /* computed rows of contacts on tibias, those on feet included */
-  int foot_rows;  /* computed rows on feet */
-  int torso_rows; /* computed rows on the torso: 0 or 1 */
-  int pair_rows;  /* computed rows between legs: 0 or HX_PAIR_ROWS */
-  int listed;     /* all computed rows: rows + torso_rows + pair_rows */
-  int row[HX_ROWS]; /* numbers of the computed rows: first of feet, then tibias, torso, pairs */
+  int has_soil; /* 1: the ground may be soil, of the definition or of a material of the terrain */
+  /* robot.c: the rows of contacts that are computed, and the terrain */
+  int rows;         /* on tibias, those on feet included */
+  int foot_rows;    /* on feet */
+  int torso_rows;   /* on the torso: 0 or 1 */
+  int pair_rows;    /* between legs: 0 or HX_PAIR_ROWS */
+  int listed;       /* all: rows + torso_rows + pair_rows */
+  int row[HX_ROWS]; /* their numbers: first of feet, then tibias, torso, pairs */
   union {
     const hxTerrain *terrain; /* NULL: plane; not saved */
     int64_t terrain_bits;     /* the same size on every machine */
   };
-  double stiffness, damping_scale, impact_speed_floor; /* eq. 14 */
-  double mu, slope;                                    /* eq. 15 */
-  double presliding, bristle_damping;                  /* eq. 16, 17 */
-  double static_rise, per_stribeck;                    /* eq. 18: mu_s - mu, 1/v_s */
-  double viscous;                                      /* s/m  eq. 35 */
-  double spin_radius, rolling_radius;                  /* m  eq. 38 */
-  double lock_stiffness, lock_damping;                 /* N m/rad, N m s/rad  of locked joints */
-  double kp, kd, torque_max, speed_max, rotor_inertia, coulomb_friction;
-  double stall_torque, back_emf;                /* N m, N m s/rad  eq. 48 */
-  double free_damping, limit_damping;           /* N m s/rad  below the motor's limits, on them */
-  double torque_constant, resistance;           /* N m/A, ohm */
-  double gear_speed, per_gear_speed;            /* rad/s, s/rad  dry friction saturates there */
-  double gear_viscous, gear_stribeck;           /* N m s/rad, N m  K_v, K_cs of eq. 50 */
-  double motor_load, external_load;             /* 1  K_m, K_e */
-  double stribeck_motor, stribeck_external;     /* 1  K_ms, K_es */
+  /* laws.c: contact */
+  double stiffness;                   /* N/m^1.5  K of eq. 14 */
+  double damping_scale;               /* s/m or 1  d of eq. 14, or d times the impact speed */
+  double impact_speed_floor;          /* m/s  the least by which the scale is divided */
+  double mu, slope;                   /* 1, s/m  eq. 15 */
+  double presliding, bristle_damping; /* m, s  eq. 16, 17 */
+  double static_rise, per_stribeck;   /* 1, s/m  eq. 18: mu_s - mu, 1/v_s */
+  double viscous;                     /* s/m  eq. 35 */
+  double spin_radius, rolling_radius; /* m  eq. 38 */
+  double soil[HX_SOIL_SIZE];          /* hxSoil under the feet, of the definition */
+  double bristle_length;              /* m  presliding, or shear displacement of the soil */
+  double pad_radius;                  /* m  of the feet's pads; 0: spheres */
+  double load_threshold;              /* N  a foot with a larger load counts its slip */
+  /* laws.c: the servos */
+  double kp, kd;                            /* N m/rad, N m s/rad  0 in torque mode */
+  double torque_max, speed_max;             /* N m, rad/s */
+  double rotor_inertia, coulomb_friction;   /* kg m2, N m */
+  double lock_stiffness, lock_damping;      /* N m/rad, N m s/rad  of locked joints */
+  double stall_torque, back_emf;            /* N m, N m s/rad  eq. 48 */
+  double emf_damping, limit_damping;        /* N m s/rad  of the motor without kd, on its limits */
+  double torque_constant, resistance;       /* N m/A, ohm */
+  double gear_speed, per_gear_speed;        /* rad/s, s/rad  dry friction saturates there */
+  double gear_viscous, gear_stribeck;       /* N m s/rad, N m  K_v, K_cs of eq. 50 */
+  double motor_load, external_load;         /* 1  K_m, K_e */
+  double stribeck_motor, stribeck_external; /* 1  K_ms, K_es */
   double quadratic_motor, quadratic_external;   /* 1/(N m)  K_mq, K_eq */
   double per_stribeck_speed, stribeck_exponent; /* s/rad, 1  1/w_s, a */
-  double spin_inertia; /* kg m2  of the rotor, times its gear ratio (eq. 54) */
-  double voltage, duty_max, supply_resistance; /* V, 1, ohm */
+  double spin_inertia;                          /* kg m2  of the rotor, times its gear ratio */
+  double voltage, duty_max, supply_resistance;  /* V, 1, ohm */
   hxHeat heat;
   double bus_period, command_step; /* s, rad  0 in kinematic mode */
-  double current_torque;           /* N m    k_t times the largest current; huge: no limit */
+  double current_torque;           /* N m  k_t times the largest current; huge: no limit */
   double goal_speed;               /* rad/s  of the firmware's setpoints; 0: no limit */
   double overload_time, overload_torque, overload_left; /* s, N m, 1  eq. 58 */
-  double ground_point[3], ground_normal[3];
-  double soil[HX_SOIL_SIZE]; /* hxSoil under the feet, of the definition */
-  double bristle_length;     /* m  presliding, or shear displacement of the soil */
-  double pad_radius;         /* m  of the feet's pads; 0: spheres */
-  double step, tolerance, step_max;
-  double load_threshold; /* N  a foot with a larger load counts its slip */
+  /* laws.c: the integration */
+  double step, step_max; /* s */
+  double tolerance;      /* 1 */
 } hxModel;
 
 /* The inputs of one step, legs innermost. */
 typedef struct hxCommand {
-  double angle[HX_JOINTS][HX_SLOTS];
-  double speed[HX_JOINTS][HX_SLOTS];
-  double torque[HX_JOINTS][HX_SLOTS];
-  double push_force[3], push_torque[3];
-  double acceleration[HX_JOINTS][HX_SLOTS];
+  double angle[HX_JOINTS][HX_SLOTS];        /* rad */
+  double speed[HX_JOINTS][HX_SLOTS];        /* rad/s */
+  double torque[HX_JOINTS][HX_SLOTS];       /* N m */
+  double push_force[3], push_torque[3];     /* N, N m  on the torso, world axes */
+  double acceleration[HX_JOINTS][HX_SLOTS]; /* rad/s2  in kinematic mode */
   double time;   /* s  time of the command, from which kinematic drives extrapolate (eq. 13) */
   double supply; /* 1  voltage of the supply over servo.voltage (eq. 53) */
   double duty[HX_JOINTS][HX_SLOTS];     /* 1  share of the duty limit that heat leaves (eq. 52) */
@@ -161,11 +174,11 @@ typedef struct hxCommand {
 
 /* Commands that servos hold until the bus transmits the next ones, legs innermost. */
 typedef struct hxBus {
-  double angle[HX_JOINTS][HX_SLOTS];
-  double speed[HX_JOINTS][HX_SLOTS];
-  double torque[HX_JOINTS][HX_SLOTS];
-  double start; /* s  of the first transmission */
-  double sent;  /* 1  transmissions since */
+  double angle[HX_JOINTS][HX_SLOTS];  /* rad */
+  double speed[HX_JOINTS][HX_SLOTS];  /* rad/s */
+  double torque[HX_JOINTS][HX_SLOTS]; /* N m */
+  double start;                       /* s  of the first transmission */
+  double sent;                        /* 1  transmissions since */
 } hxBus;
 
 /* What the servos' firmware remembers, legs innermost. */
@@ -191,7 +204,7 @@ typedef struct hxContactState {
   /* m  depth at which feet touch soil: z_p, or that of the footprint above which one is; 0 on
    *    rigid ground */
   double plastic[HX_SLOTS];
-  double place[2][HX_SLOTS];   /* m  x and y where they left the bottom of that print */
+  double place[2][HX_SLOTS];   /* m  x and y where they left the bottom of that footprint */
   double cell[2][HX_SLOTS];    /* 1    blocks: column and row over which a foot is; < 0: not held */
   double nearest[2][HX_SLOTS]; /* m  smooth grids: x and y from a foot's centre to the point nearest
                                 *    to it at the start of a step, where the search for that point
@@ -268,23 +281,23 @@ typedef struct hxMeasured {
 enum { HX_MEASURED_LINES = offsetof(hxMeasured, contact_loss) / (HX_SLOTS * sizeof(double)) };
 
 typedef struct hxState {
-  double time;
-  double next_step;        /* s  step that the error control proposes next */
-  double first_step;       /* s  the same for a call's first step, with new inputs */
-  double stored_at_start;  /* J  stored energy at the start of the energy audit */
-  double parameter_work;   /* J  given by changes of parameters since */
-  double call_start;       /* s  start of the call that an event interrupted */
-  double call_input;       /* 1  checksum of its input, a whole number; 0: no such call */
-  double call_evaluations; /* 1  evaluations before the last call began */
-  double supply;           /* 1  hxCommand.supply and duty of the last call */
-  double duty[HX_JOINTS][HX_SLOTS];
+  double time;                      /* s */
+  double next_step;                 /* s  step that the error control proposes next */
+  double first_step;                /* s  the same for a call's first step, with new inputs */
+  double stored_at_start;           /* J  stored energy at the start of the energy audit */
+  double parameter_work;            /* J  given by changes of parameters since */
+  double call_start;                /* s  start of the call that an event interrupted */
+  double call_input;                /* 1  checksum of its input, a whole number; 0: no such call */
+  double call_evaluations;          /* 1  evaluations before the last call began */
+  double supply;                    /* 1  hxCommand.supply of the last call, */
+  double duty[HX_JOINTS][HX_SLOTS]; /* 1    and its duty */
   double locked[HX_JOINTS][HX_SLOTS]; /* 1    1: the joint is locked */
   double held[HX_JOINTS][HX_SLOTS];   /* rad  where it was locked */
   hxBus bus;
   hxFirmware firmware;
   hxPlantMotion motion;
   hxContactState contact;
-  double evaluations, steps, rejected, touchdowns;
+  double evaluations, steps, rejected, touchdowns; /* 1  counts since the start */
   hxMeasured measured;
   hxMoment moment;       /* end of the last step */
   hxCompleted completed; /* model exchange: end of the last step */

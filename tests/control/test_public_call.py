@@ -226,11 +226,16 @@ def test_a_report_of_no_result_is_refused(results: Any, tmp_path: Path) -> None:
 
 
 @NEEDS_PUBLIC_CALL
-def test_a_report_in_no_folder_and_a_column_of_no_name_are_refused(runs: list[Result]) -> None:
+def test_a_report_in_no_folder_and_a_column_of_no_name_are_refused(
+    runs: list[Result], tmp_path: Path
+) -> None:
     with pytest.raises(HexapodError, match=r"folder: wrong type of an argument: got 'nothing"):
         hexapod_cosim.report(runs, None)  # type: ignore[arg-type]
     with pytest.raises(HexapodError, match="column: wrong type of an argument: got 3"):
         runs[0].recording.column(3)  # type: ignore[arg-type]
+    (tmp_path / "file").touch()
+    with pytest.raises(HexapodError, match="cannot write: got 'a file where a folder should be'"):
+        hexapod_cosim.report(runs, tmp_path / "file" / "out")
 
 
 def test_numbers_of_numpy_are_settings() -> None:
@@ -251,10 +256,18 @@ def test_a_controller_of_no_gait_and_a_robot_of_no_name_are_refused() -> None:
         load_robot(None)  # type: ignore[arg-type]
     with pytest.raises(HexapodError, match="robot: wrong type of an argument: got 'athena'"):
         Controller("athena", period=0.005, gait=make_gait(robot))  # type: ignore[arg-type]
+    with pytest.raises(HexapodError, match="gains: wrong type of an argument: got 'stiff'"):
+        Controller(robot, period=0.005, gait=make_gait(robot), gains="stiff")  # type: ignore[arg-type]
+    with pytest.raises(HexapodError, match="unknown law: expected one of"):
+        Controller(robot, period=0.005, gait=make_gait(robot), law=None)  # type: ignore[arg-type]
     with pytest.raises(HexapodError, match="robot: wrong type of an argument"):
         make_gait("athena")  # type: ignore[arg-type]
     with pytest.raises(HexapodError, match="name: wrong type of an argument: got 3"):
         make_gait(robot, 3)  # type: ignore[arg-type]
+    with pytest.raises(HexapodError, match="duty: wrong type of an argument: got 'half'"):
+        make_gait(robot, duty="half")  # type: ignore[arg-type]
+    with pytest.raises(HexapodError, match="step_height: wrong type of an argument: got 'high'"):
+        make_gait(robot, step_height="high")  # type: ignore[arg-type]
     with pytest.raises(HexapodError, match="mine: wrong type: got 3, expected a table"):
         robot_from_table(3, where="mine")  # type: ignore[arg-type]
 

@@ -351,6 +351,8 @@ def test_the_fmu_of_another_robot_is_refused(athena_fmu: Path) -> None:
             {"torso.mass": "heavy"},
             "parameter torso.mass is refused: got 'heavy', expected a number",
         ),
+        ({"torso.mass": True}, "parameter torso.mass is refused: got True, expected a number"),
+        ({"torso.mass": np.int64(-3)}, r"athena.fmu: torso.mass: got -3, expected a finite number"),
         (
             {"contact.law": "herz"},
             "unknown choice for contact.law: got 'herz'.*did you mean 'hertz'",
@@ -398,6 +400,10 @@ def test_what_is_no_fmu_is_refused_before_anything_is_loaded(
         "not an FMU": plain,
         "not an FMU: got .There is no item": make_zip(tmp_path / "empty.fmu", {"other.txt": ""}),
         "cannot be read": make_zip(tmp_path / "broken.fmu", {"modelDescription.xml": "<fmi"}),
+        "got 'missing or wrong attributes'": make_zip(
+            tmp_path / "old.fmu",
+            {"modelDescription.xml": '<fmiModelDescription fmiVersion="1.0" guid="1"/>'},
+        ),
         "the FMU cannot be loaded": make_zip(
             tmp_path / "hollow.fmu", {"modelDescription.xml": description}
         ),

@@ -193,7 +193,7 @@ def test_the_servo_is_the_twins_and_its_slopes_are_its_derivatives(
         def total(speed: float, angle: float = q) -> float:
             return torque(angle, speed) + float(gear_friction(servo, np.array([speed]))[0])
 
-        asked = np.append(command, strength)
+        asked = np.append(command, [1.0, strength])
         got = probed(core.hx_probe_servo, plant, float(q), float(qd), asked, size=4)
         assert got[:2] == pytest.approx(
             [torque(q, qd), float(gear_friction(servo, np.array([qd]))[0])], rel=SAME

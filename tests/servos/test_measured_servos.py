@@ -70,10 +70,11 @@ def test_the_plants_servos_are_the_twins(core: ct.CDLL, name: str, mode: str) ->
         angle, speed, *refs = rng.normal(0.0, [0.3, 2.0, 0.3, 1.0, 3.0])
         motor, external = rng.normal(0.0, 3.0, 2)
         state = [np.array([value]) for value in (angle, speed, *refs)]
-        power = Power(1.0, 1.0, float(rng.choice((1.0, 0.3, 0.0))))
+        supply = float(rng.choice((1.0, 0.7)))
+        power = Power(supply, supply, float(rng.choice((1.0, 0.3, 0.0))))
         torque = servo_torque(servo, *state, power=power)
         slopes = servo_slopes(servo, *state, power=power)
-        given = np.array([*refs, power.strength])
+        given = np.array([*refs, supply, power.strength])
         got = probed(core.hx_probe_servo, plant, angle, speed, given, size=4)
         drag = servo.coulomb_friction / servo.friction_speed
         drag *= 1.0 - math.tanh(speed / servo.friction_speed) ** 2

@@ -195,3 +195,6 @@ def test_what_is_no_study_is_refused(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text("seeds = \n")
     with pytest.raises(StudyError, match="not a TOML file"):
         load_study(tmp_path / "bad.toml")
+    (tmp_path / "empty.toml").write_text("# nothing\n")
+    with pytest.raises(StudyError, match=r"empty\.toml: an empty study: expected at least one key"):
+        load_study(tmp_path / "empty.toml")

@@ -78,15 +78,13 @@ static inline hxServo hx_servo_slopes(const hxModel *model, hxReal angle, hxReal
       model->servo_drive == HX_DRIVE_MOTOR
           ? ~free & hx_less(hx_abs(motor.torque), model->current_torque * power.strength)
           : ~free & hx_less(zero, motor.torque * motor.load) & hx_less(hx_abs(motor.load), one);
+  const hxReal gain = model->servo_drive == HX_DRIVE_MOTOR ? power.supply : one;
   const hxReal t = hx_tanh(speed * model->per_gear_speed);
   return (hxServo){
       .torque = motor.torque,
       .friction = -model->coulomb_friction * t,
-      .stiffness = hx_select(free,
-                             model->servo_drive == HX_DRIVE_MOTOR ? model->kp * power.supply
-                                                                  : hx_splat(model->kp),
-                             zero),
-      .damping = hx_select(free, hx_splat(model->free_damping),
+      .stiffness = hx_select(free, model->kp * gain, zero),
+      .damping = hx_select(free, model->kd * gain + model->emf_damping,
                            hx_select(falling, model->limit_damping * power.strength, zero)),
       .drag = (model->coulomb_friction / model->gear_speed) * (1.0 - t * t),
   };

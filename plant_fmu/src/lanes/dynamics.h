@@ -9,9 +9,9 @@
 
 #include "stage.h"
 
-/* ---- the sweeps of eq. 10-11 ---- */
+/* ---- the sweeps (eq. 10) and the multipliers (eq. 11) ---- */
 
-/* Returns 1/d, d = S.U + the joint's own resistance; 0 for a kinematic drive. */
+/* Returns 1/d of eq. 10, d = S.U + the joint's own resistance; 0 for a kinematic drive. */
 static inline hxReal sweep_inverse(const hxModel *model, const hxSweep *sweep, hxReal resists) {
   return model->servo_mode == HX_SERVO_KINEMATIC ? hx_splat(0.0)
                                                  : 1.0 / (hx_power(sweep->U, sweep->S) + resists);
@@ -28,7 +28,8 @@ HX_RARE void couple_rotor(const hxModel *model, hxSweep *sweep) {
   sweep->U.ang = hx_add_scaled(sweep->U.ang, hx_splat(model->spin_inertia), sweep->S.ang);
 }
 
-/* Adds the link's own inertia, computes U = I S, and passes I - U U^T/d to the parent. */
+/* Adds the link's own inertia, computes U = I S, and passes I - U U^T/d to the parent
+ * (eq. 10). */
 static inline void sweep_sum(const hxModel *model, const hxRigid6 *own, hxReal resists,
                              hxSweep *sweep, hxInertia6 *I) {
   hx_inertia_add_rigid(I, own);
@@ -77,7 +78,7 @@ static inline void sweep_inertia(const hxModel *model, const hxImplicit *implici
   sweep_sum(model, &own, resists, sweep, I);
 }
 
-/* Computes u = torque - S.p, and passes p + U u/d to the parent (eq. 11). */
+/* Computes u = torque - S.p, and passes p + U u/d to the parent (eq. 10). */
 static inline void sweep_force(const hxModel *model, hxJointWork *k, hxForce6 *p) {
   hxSweep *sweep = &k->sweep;
   *p = hx_force_add(*p, k->p);
@@ -86,13 +87,15 @@ static inline void sweep_force(const hxModel *model, hxJointWork *k, hxForce6 *p
   if (model->spin) p->ang = hx_add3(p->ang, sweep->passed);
 }
 
-/* Computes the acceleration of a rotor from those of its joint and of the body that carries it. */
+/* Computes the acceleration of a rotor from those of its joint and of the body that carries it
+ * (eq. 54). */
 HX_RARE void rotor_motion(hxReal qdd, const hxMotion6 *a, hxJointWork *k) {
   k->rotor.turn += hx_dot(k->sweep.S.ang, a->ang);
   k->rotor.acceleration = qdd + k->driven;
 }
 
-/* Computes qdd = (u - U.a)/d, and passes a + S qdd to the child, without its bias. */
+/* Computes qdd = (u - U.a)/d, and passes a + S qdd to the child, without its bias: the second sweep
+ * (eq. 8). */
 static inline void sweep_motion(const hxModel *model, hxJointWork *k, hxMotion6 *a) {
   const hxSweep *sweep = &k->sweep;
   const hxReal qdd = sweep->inverse_d * (sweep->u - hx_power(sweep->U, *a));
@@ -103,9 +106,9 @@ static inline void sweep_motion(const hxModel *model, hxJointWork *k, hxMotion6 
   k->acceleration = (hxMotion6){felt.ang, motion_at(felt, k->c)};
 }
 
-/* Computes the multipliers from leaf to root: D_kk^T lambda_k = g_k - M_k dv_k - sum over children
- * c of D_ck^T lambda_c. About the joint's point the torque is -(u1 lambda_4 + u2 lambda_5) and the
- * component along the axis, with u1 = a x s, u2 = b x s. */
+/* Computes the multipliers from leaf to root (eq. 11): D_kk^T lambda_k = g_k - M_k dv_k - sum over
+ * children c of D_ck^T lambda_c. About the joint's point the torque is -(u1 lambda_4 + u2 lambda_5)
+ * and the component along the axis, with u1 = a x s, u2 = b x s. */
 static inline void leg_multipliers(const hxModel *model, const hxImplicit *implicit, int pack,
                                    int pairs, hxLegWork *leg) {
   const int slot = pack * HX_LANES;
@@ -178,7 +181,8 @@ HX_RARE void add_torso_contacts(const hxModel *model, const hxImplicit *implicit
   add_slots(&work->torso_p->ang.x, FORCE, &p->ang.x);
 }
 
-/* Solves (I + sum of legs) (dv - g) = push and gyroscopic torque - sum of legs. */
+/* Solves the torso's row of eq. 1 with what the legs pass to it (eq. 10):
+ * (I + sum of legs) (dv - g) = push and gyroscopic torque - sum of legs. */
 static inline hxMotion6 torso_acceleration(const hxModel *model, const hxCommand *command,
                                            const hxWork *work, const hxInertia6 *I,
                                            const hxForce6 *p) {
@@ -432,8 +436,8 @@ HX_RARE void add_further_impulses(const hxModel *model, const hxImplicit *implic
       sum->pair[pair][pack] = hx_add_scaled(sum->pair[pair][pack], w, work->pair[pair][pack].force);
 }
 
-/* Adds a stage's impulses: weight times the forces that the stage's accelerations contain, with
- * their linearly implicit parts. */
+/* Adds a stage's impulses (eq. 27): weight times the forces that the stage's accelerations contain,
+ * with their linearly implicit parts. */
 static inline void hx_add_impulses(const hxModel *model, const hxCommand *command,
                                    const hxImplicit *implicit, const hxWork *work, double weight,
                                    hxImpulses *sum) {

@@ -7,7 +7,7 @@
 #include "foot.h"
 #include "kinematics.h"
 
-/* Quantities of joint k in the O(n) sweeps of eq. 10-11. */
+/* Quantities of joint k in the O(n) sweeps of eq. 10. */
 typedef struct {
   hxMotion6 S;      /* (s, P x s) */
   hxForce6 U;       /* I S, with I the articulated inertia of the child and all it carries */

@@ -83,7 +83,7 @@ static void compile_servo(hxModel *model, const hxDefinition *d) {
   model->servo_mode = d->servo.mode, model->servo_drive = d->servo.drive;
   model->kp = follows ? d->servo.kp : 0.0, model->kd = follows ? d->servo.kd : 0.0;
   model->torque_max = d->servo.torque_max, model->speed_max = d->servo.speed_max;
-  model->free_damping = model->kd, model->limit_damping = model->torque_max / model->speed_max;
+  model->emf_damping = 0.0, model->limit_damping = model->torque_max / model->speed_max;
   model->torque_constant = d->servo.torque_constant, model->resistance = d->servo.resistance;
   model->rotor_inertia = d->servo.rotor_inertia;
   model->current_torque = 1e300; /* without a limit it changes no bit */
@@ -94,7 +94,7 @@ static void compile_servo(hxModel *model, const hxDefinition *d) {
     model->stall_torque = per_volt * d->servo.duty_max * d->servo.voltage;
     model->back_emf = d->servo.torque_constant * per_volt;
     model->limit_damping = model->back_emf;
-    if (follows) model->free_damping = model->kd + model->back_emf;
+    if (follows) model->emf_damping = model->back_emf;
   }
   compile_supply(model, d);
   model->lock_stiffness = (motor ? model->stall_torque : model->torque_max) / lock_yield;

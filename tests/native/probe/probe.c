@@ -210,12 +210,14 @@ HX_API void hx_probe_gear(const hxPlant *plant, double speed, double motor, doub
   out[0] = hx_lane(servo.friction, 0), out[1] = hx_lane(servo.drag, 0);
 }
 
-/* Computes a servo. command: angle, speed, torque; out: torque, friction, stiffness, damping. */
+/* Computes a servo. command: angle, speed, torque, supply, strength; out: torque, friction,
+ * stiffness, damping. */
 HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
-                           const double command[4], double out[4]) {
+                           const double command[5], double out[4]) {
+  const hxReal supply = hx_splat(command[3]);
   const hxServo servo = hx_servo_slopes(
       &plant->model, hx_splat(angle), hx_splat(speed), hx_splat(command[0]), hx_splat(command[1]),
-      hx_splat(command[2]), (hxPower){hx_splat(1.0), hx_splat(1.0), hx_splat(command[3])});
+      hx_splat(command[2]), (hxPower){supply, supply, hx_splat(command[4])});
   out[0] = hx_lane(servo.torque, 0), out[1] = hx_lane(servo.friction, 0);
   out[2] = hx_lane(servo.stiffness, 0), out[3] = hx_lane(servo.damping + servo.drag, 0);
 }
