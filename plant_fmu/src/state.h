@@ -41,6 +41,21 @@ enum {
   HX_TIBIA_ROWS = HX_TORSO
 };
 
+/* What a friction law has. Its function is in lanes/friction.h. */
+typedef struct {
+  int has_friction, has_bristles; /* forces along the ground; feet stand on bristles */
+} hxFrictionKind;
+
+static inline hxFrictionKind hx_friction_kind(int law) {
+  static const hxFrictionKind laws[] = {
+      [HX_FRICTION_TANH] = {1, 0},
+      [HX_FRICTION_NONE] = {0, 0},
+      [HX_FRICTION_BRISTLE] = {1, 1},
+      [HX_FRICTION_LUGRE] = {1, 1},
+  };
+  return laws[law];
+}
+
 /* Numbers of hxSoil (ground/soil.h). */
 enum { HX_SOIL_SIZE = 16 };
 

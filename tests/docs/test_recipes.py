@@ -70,8 +70,10 @@ FRICTION = {  # file -> text, and what the reader of the recipe writes below it
             "  case HX_FRICTION_NONE:\n    return hx_splat(0.0);\n",
             "  case HX_FRICTION_RATIONAL:\n"
             "    return model->slope / (1.0 + model->slope * speed);\n",
-        ),
-        ("[HX_FRICTION_LUGRE] = {1, 1},\n", "[HX_FRICTION_RATIONAL] = {1, 0},\n"),
+        )
+    ],
+    "plant_fmu/src/state.h": [
+        ("[HX_FRICTION_LUGRE] = {1, 1},\n", "[HX_FRICTION_RATIONAL] = {1, 0},\n")
     ],
     "plant_fmu/interface.toml": [
         (

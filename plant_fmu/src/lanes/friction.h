@@ -5,21 +5,6 @@
 
 #include "../packs/vec3.h"
 
-/* A row of the table of laws. */
-typedef struct {
-  int has_friction, has_bristles; /* forces along the ground; feet stand on bristles */
-} hxFrictionKind;
-
-static inline hxFrictionKind hx_friction_kind(int law) {
-  static const hxFrictionKind laws[] = {
-      [HX_FRICTION_TANH] = {1, 0},
-      [HX_FRICTION_NONE] = {0, 0},
-      [HX_FRICTION_BRISTLE] = {1, 1},
-      [HX_FRICTION_LUGRE] = {1, 1},
-  };
-  return laws[law];
-}
-
 /* Tangential force of a foot with bristles (eq. 16-18, 36, 37). */
 typedef struct {
   hxVec3 grip;       /* 1    -f_t over f_n */

@@ -7,7 +7,6 @@
 #include "../contact_law.h"
 #include "../ground/soil.h"
 #include "../ground/surface.h"
-#include "../lanes/friction.h"
 
 static const double load_share = 0.01; /* 1  of the weight; feet with more count their slip */
 

@@ -3,7 +3,6 @@
 
 #include <math.h>
 
-#include "../lanes/friction.h"
 #include "hexapod/message.h"
 #include "hexapod/range_check.h"
 
