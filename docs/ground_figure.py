@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from hexapod_cosim.controller.figure_style import SETTINGS, WIDTH
 from hexapod_cosim.cosim.common.control_style import control_styles
 from hexapod_cosim.cosim.results.side_by_side import SEEDS, read_seeds
-from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.results.summary import Summary, finite_mean
 
 LARGEST, SMALLER = 7.0, 0.75  # size of the first control's mark, and share of each next one's
 ROOM = 1.06  # of an axis over its largest value
@@ -65,18 +65,12 @@ def _row(name: str, control: str, runs: list[Summary]) -> Row:
     tilts = [math.hypot(run["roll_rms"], run["pitch_rms"]) for run in walked]
     values = {
         "walked": 100.0 * len(walked) / len(runs),
-        "slip": 1e3 * _mean([run["slip_per_metre"] for run in walked]),
-        "peak": _mean([run["peak_force"] for run in walked]),
-        "tilt": math.degrees(_mean(tilts)),
-        "path": 1e3 * _mean([run["path_error"] for run in walked]),
+        "slip": 1e3 * finite_mean([run["slip_per_metre"] for run in walked]),
+        "peak": finite_mean([run["peak_force"] for run in walked]),
+        "tilt": math.degrees(finite_mean(tilts)),
+        "path": 1e3 * finite_mean([run["path_error"] for run in walked]),
     }
     return Row(name, control, values)
-
-
-def _mean(values: list[float]) -> float:
-    """Returns the mean of the finite values, NaN without any."""
-    finite = [value for value in values if math.isfinite(value)]
-    return float(np.mean(finite)) if finite else math.nan
 
 
 def draw_terrains(rows: list[Row]) -> Figure:

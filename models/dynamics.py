@@ -30,7 +30,7 @@ from hexapod_cosim.models.kinematics import (
     rotation_matrix,
 )
 from hexapod_cosim.models.records import Robot, Servo
-from hexapod_cosim.models.servos.motor import FULL, Power, friction_torque, has_measured_friction
+from hexapod_cosim.models.servos.motor import FULL, Power, has_measured_friction, measured_friction
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,15 +154,14 @@ def joint_torques(
     load = np.zeros_like(angle) if external is None else external
     measured = has_measured_friction(servo)
     if servo.mode == "kinematic":
-        gear = (
-            friction_torque(servo, speed, -load, load) if measured else gear_friction(servo, speed)
-        )
+        balanced = (servo, speed, -load, load)
+        gear = measured_friction(*balanced) if measured else gear_friction(servo, speed)
         return np.zeros_like(gear), gear
     references = (command.angle_ref, command.speed_ref, command.torque_ref)
     motor = servo_torque(servo, angle, speed, *references, power=command.power)
     if not measured:
         return motor, gear_friction(servo, speed)
-    return motor, friction_torque(servo, speed, motor, load)
+    return motor, measured_friction(servo, speed, motor, load)
 
 
 def external_torques(

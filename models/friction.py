@@ -66,7 +66,7 @@ class Grip:
     force: Array  # (3,) N  f_t
     damping: float  # s/m  of -f_t/f_n, by the slip; with bristles by db/dt
     stiffness: float = 0.0  # 1/m  of -f_t/f_n, by b
-    beta: float = 0.0  # 1/s  release rate of bristles: of db/dt, by -b
+    relaxation: float = 0.0  # 1/s  beta of eq. 21: of db/dt, by -b
 
 
 # laws without bristles
@@ -167,10 +167,10 @@ def bristle_friction(friction: Friction, normal: float, slip: Array, bristle: Ar
     secant = (3.0 - min(size, 1.0) ** 2) / (2.0 * max(size, 1.0))
     room, push = 1.0 - secant * size, per_rate * float(np.linalg.norm(slip - plastic))
     share = room / math.hypot(room, push) if push > 0.0 or room > 0.0 else 0.0
-    beta = float(bristle_yield(np.array(size))) * max(float(slip @ u), 0.0)
-    beta /= max(size, SPRING_LIMIT) * friction.presliding
+    relaxation = float(bristle_yield(np.array(size))) * max(float(slip @ u), 0.0)
+    relaxation /= max(size, SPRING_LIMIT) * friction.presliding
     damping = mu * per_rate * share + friction.viscous
-    return Grip(force, damping, mu * secant / friction.presliding, beta)
+    return Grip(force, damping, mu * secant / friction.presliding, relaxation)
 
 
 # LuGre
@@ -181,7 +181,7 @@ def rest_friction(friction: Friction) -> float:
     return max(friction.mu, friction.mu_static)
 
 
-def lugre_release(friction: Friction, speed: Array) -> Array:
+def lugre_relaxation(friction: Friction, speed: Array) -> Array:
     """Returns the rate [1/s] at which the bristles of the LuGre law yield at a slip speed [m/s].
 
     It is v mu_0 / (mu(v) b_max) (eq. 36), in the shape of v.
@@ -195,7 +195,7 @@ def lugre_release(friction: Friction, speed: Array) -> Array:
 def lugre_sliding(friction: Friction, slip: Array, bristle: Array) -> Array:
     """Returns the part (..., 3) of the slip (..., 3) [m/s] that bristles lose by yielding."""
     speed = np.linalg.norm(slip, axis=-1, keepdims=True)
-    return lugre_release(friction, speed) * bristle
+    return lugre_relaxation(friction, speed) * bristle
 
 
 def lugre_friction(friction: Friction, normal: float, slip: Array, bristle: Array) -> Grip:
@@ -211,8 +211,8 @@ def lugre_friction(friction: Friction, normal: float, slip: Array, bristle: Arra
     sigma = still / (1.0 + still * speed / (sliding_friction(friction, speed) + NO_FRICTION))
     rate = slip - lugre_sliding(friction, slip, bristle)
     force = -normal * (stiffness * bristle + sigma * rate + friction.viscous * slip)
-    release = float(lugre_release(friction, np.array(speed)))
-    return Grip(force, sigma + friction.viscous, stiffness, release)
+    relaxation = float(lugre_relaxation(friction, np.array(speed)))
+    return Grip(force, sigma + friction.viscous, stiffness, relaxation)
 
 
 # the table

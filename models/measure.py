@@ -137,7 +137,7 @@ def step_works(
     return Works(impulses.motor * speed, contact, friction, gear - (springs[1] - springs[0]))
 
 
-def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Impulses) -> Array:
+def measure_cone(robot: Robot, before: Array, after: Array, h: float, impulses: Impulses) -> Array:
     """Returns the time (31,) [s] of feet under load in a step, by the share of the friction cone
     (eq. 30).
 
@@ -173,11 +173,11 @@ def measured_step(
     work: (6, 3) the motors' works of `step_works` [J]; damping: (6,) d of eq. 14 [s/m], nan for
     feet that are open during the step.
     """
-    joints = _joints(robot, before, after, h, command, work)
-    return Measured(*joints, *_feet(robot, before, after, h, damping))
+    joints = measure_joints(robot, before, after, h, command, work)
+    return Measured(*joints, *measure_feet(robot, before, after, h, damping))
 
 
-def _joints(
+def measure_joints(
     robot: Robot, before: Array, after: Array, h: float, command: Command, work: Array
 ) -> tuple[Array, Array, Array]:
     """Returns positive and negative work and the integral of the squared torque, each (6, 3)."""
@@ -208,7 +208,7 @@ def _joints(
     return positive - excess, negative - excess, squared
 
 
-def _feet(
+def measure_feet(
     robot: Robot, before: Array, after: Array, h: float, damping: Array
 ) -> tuple[Array, Array, Array, Array]:
     """Returns slip under load, impulse, largest normal force and its steepest rise, each (6,)."""
@@ -240,7 +240,9 @@ def _feet(
     return slipped, h * FOOT_WEIGHTS @ force, force.max(axis=0), np.maximum(rises.max(axis=0), 0.0)
 
 
-def landing_rate(robot: Robot, time: Array, delta: Array, ddelta: Array, damping: Array) -> float:
+def measure_landing(
+    robot: Robot, time: Array, delta: Array, ddelta: Array, damping: Array
+) -> float:
     """Returns the largest rise [N/s] of a foot's normal force over 1 ms of a landing (eq. 29).
 
     The windows end every 0.1 ms of the 20 ms after touch-down; forces before touch-down are 0.

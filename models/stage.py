@@ -42,11 +42,10 @@ from hexapod_cosim.models.dynamics import (
     solve_constrained,
     stop_torques,
 )
-from hexapod_cosim.models.friction import friction_drag as foot_drag
-from hexapod_cosim.models.friction import friction_grip
+from hexapod_cosim.models.friction import friction_drag, friction_grip
 from hexapod_cosim.models.kinematics import BODIES, JOINTS, LEGS, joint_angles, joint_speeds
 from hexapod_cosim.models.records import Robot
-from hexapod_cosim.models.servos.motor import friction_drag, has_measured_friction
+from hexapod_cosim.models.servos.motor import has_measured_friction, measured_drag
 from hexapod_cosim.models.soil.law import shear_limit, soil_normal_force, soil_normal_slopes
 
 
@@ -58,7 +57,7 @@ class ContactSlopes:
     viscosity: float  # N s/m  of the normal force by ddelta
     drag: float  # N s/m  of friction by slip velocity; bristles: by their rate
     bristle: float = 0.0  # N/m    of friction by the bristles' deflection, -G_b
-    beta: float = 0.0  # 1/s    release rate of sliding bristles
+    relaxation: float = 0.0  # 1/s    beta of eq. 21
     spin: float = 0.0  # N m s  of the foot's moment by angular velocity, about the normal
     roll: float = 0.0  # N m s  the same across the normal
 
@@ -114,7 +113,7 @@ def keep_slopes(
             if kinematic
             else servo_torque(robot.servo, angle, speed, *references, power=command.power)
         )
-        drag = friction_drag(robot.servo, speed, torque, load)
+        drag = measured_drag(robot.servo, speed, torque, load)
     return Slopes(*motor, drag, *stops, found)
 
 
@@ -140,11 +139,12 @@ def rigid_slopes(
     f_n, (stiffness, viscosity) = normal_force(*at), normal_slopes(*at)
     slip, friction = slip_velocity(contact), state.friction
     if not point.is_sole:
-        along = f_n * foot_drag(friction, float(np.linalg.norm(slip)))
+        along = f_n * friction_drag(friction, float(np.linalg.norm(slip)))
         slopes = ContactSlopes(stiffness, viscosity, along)
     else:
         b = friction_grip(friction, f_n, slip, bristle)
-        slopes = ContactSlopes(stiffness, viscosity, f_n * b.damping, f_n * b.stiffness, b.beta)
+        drag, spring = f_n * b.damping, f_n * b.stiffness
+        slopes = ContactSlopes(stiffness, viscosity, drag, spring, b.relaxation)
     if point.leg < 0:
         return slopes
     spin, roll = turning_slopes(friction, robot.foot.radius, contact.normal, turn)
@@ -160,7 +160,7 @@ def soil_slopes(
     limit = shear_limit(soil, foot, max(depth, plastic), soil_normal_force(*at))
     yielding = float(np.linalg.norm(slip_velocity(contact))) / soil.shear_displacement
     shear = limit / soil.shear_displacement
-    return ContactSlopes(*soil_normal_slopes(*at), drag=0.0, bristle=shear, beta=yielding)
+    return ContactSlopes(*soil_normal_slopes(*at), drag=0.0, bristle=shear, relaxation=yielding)
 
 
 def slope_matrices(
@@ -253,7 +253,7 @@ def solve_stage(
     # bristles: a spring across the normal, -G_b/(1 + z beta), stretched by s_b + z (db/dt + s_v)
     soles = sole_bristles(robot, body, bristle, contacts, slopes)
     for sole in soles:
-        spring = sole.law.bristle / (1.0 + z * sole.law.beta)
+        spring = sole.law.bristle / (1.0 + z * sole.law.relaxation)
         W += z * z * spring * sole.T.T @ sole.T
         right -= spring * sole.T.T @ (s_b[sole.leg] + z * (sole.rate + sole.T @ s_v))
     # [W  D^T; D  0] [alpha; lambda] = [right; c]
@@ -263,6 +263,6 @@ def solve_stage(
     # nu = v + s_v + z alpha;  k_b/h = (db/dt + s_v + z alpha - beta s_b)/(1 + z beta)
     rate = np.zeros((LEGS, JOINTS))
     for sole in soles:
-        moved = sole.rate + sole.T @ (s_v + z * alpha) - sole.law.beta * s_b[sole.leg]
-        rate[sole.leg] = moved / (1.0 + z * sole.law.beta)
+        moved = sole.rate + sole.T @ (s_v + z * alpha) - sole.law.relaxation * s_b[sole.leg]
+        rate[sole.leg] = moved / (1.0 + z * sole.law.relaxation)
     return StageRate(v + s_v + z * alpha, alpha, rate)

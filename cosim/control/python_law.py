@@ -88,7 +88,10 @@ def parameters_of(law: type[Any]) -> tuple[dict[str, bool], bool]:
     """Returns whether each parameter of a class is required, and whether it takes any name."""
     if law.__init__ is object.__init__:
         return {}, False
-    found = inspect.signature(law).parameters.values()
+    try:
+        found = inspect.signature(law).parameters.values()
+    except ValueError:  # a class of C code, such as dict
+        return {}, False
     named = {item.name: item.default is item.empty for item in found if item.kind in BY_NAME}
     return named, any(item.kind is item.VAR_KEYWORD for item in found)
 
@@ -138,12 +141,14 @@ def build(law: type[Any], path: Path, given: Mapping[str, Any], settings: Mappin
 class PythonLaw:
     """Drives a user's controller object: checks its commands and explains its exceptions.
 
-    `path`: the file of its class, if known.
+    `path`: the file of its class, if known. Raises ControllerError when its method step takes other
+    arguments.
     """
 
     def __init__(self, law: Any, *, path: Path | None = None) -> None:
         self._law, self._path = law, path or file_of(type(law))
         self._name = type(law).__name__
+        _check_signature(law, self._path)
         self.diagnostics = getattr(law, "diagnostics", None)
 
     @property
@@ -188,6 +193,24 @@ class PythonLaw:
         )
 
 
+def _check_signature(law: Any, path: Path | None) -> None:
+    """Raises ControllerError for a method step that cannot be called with three arguments."""
+    try:
+        found = inspect.signature(law.step)
+    except (TypeError, ValueError):  # of C code, which has no signature
+        return
+    try:
+        found.bind("t", "command", "measurement")
+    except TypeError:
+        raise ControllerError(
+            f"{type(law).__name__}.step takes other arguments",
+            got=f"step{found}",
+            expected="step(t, command, measurement)",
+            fix="write `def step(self, t, command, measurement):`",
+            where=None if path is None else str(path),
+        ) from None
+
+
 def file_of(law: type[Any]) -> Path | None:
     """Returns the file of a class; None for a class of a notebook or of C code."""
     try:
@@ -213,14 +236,20 @@ def users_errors(path: Path | None) -> Iterator[None]:
 def _explained(error: Exception | SystemExit, path: Path | None) -> ControllerError:
     """Returns the error of a user's code as one sentence: where it arose, what it is, the line."""
     text = " ".join(str(error).split())
+    where, line = str(path) if path else None, ""
     if isinstance(error, SyntaxError) and error.filename:
         where, line = f"{error.filename}, line {error.lineno}", error.text or ""
         text = error.msg
     else:
-        frames = traceback.extract_tb(error.__traceback__)
+        frames = [
+            frame
+            for frame in traceback.extract_tb(error.__traceback__)
+            if frame.filename != __file__ and not frame.filename.startswith("<frozen")
+        ]
         own = [frame for frame in frames if path and Path(frame.filename).resolve() == path]
-        frame = (own or frames)[-1]
-        where, line = f"{frame.filename}, line {frame.lineno}, in {frame.name}", frame.line or ""
+        for frame in (own or frames)[-1:]:  # none when our call or numpy refused the user's objects
+            where = f"{frame.filename}, line {frame.lineno}, in {frame.name}"
+            line = frame.line or ""
     what = f"{type(error).__name__}: {text}" if text else type(error).__name__
     fix = f"correct the line `{line.strip()}`" if line.strip() else "correct the controller"
     if isinstance(error, SystemExit):

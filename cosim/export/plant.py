@@ -34,7 +34,7 @@ from hexapod_cosim.cosim.interface.model_description3 import render_build_descri
 from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.cosim.interface.terminals import FOLDER, ICON, render_terminals
-from hexapod_cosim.models.errors import FmuError
+from hexapod_cosim.models.errors import FmuError, check_type
 from hexapod_cosim.models.ground.faces import surface_of
 from hexapod_cosim.models.ground.grid_file import grid_bytes
 from hexapod_cosim.models.ground.surface import Surface
@@ -83,6 +83,7 @@ def export_fmu(
     Raises FmuError without a binary or cross compiler, for an unknown version or platform and for
     invalid start values; HexapodError when the path cannot be written.
     """
+    check_type(robot, Robot, "a Robot, as of load_robot()", where="robot", error=FmuError)
     own = surface_of(robot.terrain)
     grids = list(dict.fromkeys([*([] if own is None else [own]), *terrains]))
     if grids and own is None:
@@ -113,6 +114,7 @@ def export_controller(
 
     Arguments and errors are those of `export_fmu`; also raises the errors of `Controller`.
     """
+    check_type(setup, ControllerSetup, "a ControllerSetup", where="setup", error=FmuError)
     interface = with_starts(load_controller_interface(setup), starts)
     return export_interface(interface, path, fmi=fmi, platforms=platforms, bare=bare)
 
@@ -139,6 +141,7 @@ def export_interface(
 
     grids, packed: grid files, and binaries instead of `platforms`, by their path in the FMU.
     """
+    check_type(path, (str, Path), "the path of the file to write", where="path", error=FmuError)
     if fmi not in FMI_VERSIONS:
         offered = ", ".join(map(str, FMI_VERSIONS))
         raise FmuError(

@@ -28,7 +28,7 @@ from hexapod_cosim.cosim.master.fmu_block import (
     StepError,
     parameter_number,
 )
-from hexapod_cosim.models.errors import FmuError, suggestion
+from hexapod_cosim.models.errors import FmuError, check_type, suggestion
 
 LAST_SUCCESSFUL_TIME = 2  # fmi2StatusKind
 
@@ -40,6 +40,7 @@ class Fmu(Closing):
     """
 
     def __init__(self, path: str | Path, *, name: str = "plant") -> None:
+        check_type(path, (str, Path), "the path of an FMU", where="path", error=FmuError)
         self.path = Path(path)
         self.description = read_description(self.path)
         self.variables = {variable.name: variable for variable in self.description.modelVariables}

@@ -277,7 +277,7 @@ class NativeMaster:
         """Returns the error that ended the macro-step at t [s], worded as the Python master's."""
         stepper = self._master.stepper
         number = loop_header().constants
-        which, what = next(told for name, told in CALLS.items() if number[name] == stepper.call)
+        which, what = next(call for name, call in CALLS.items() if number[name] == stepper.call)
         fmu = self._fmus[which]
         return (
             fmu.log.failure(what, stepper.status) if what else fmu.step_failure(t, stepper.status)

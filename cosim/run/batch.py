@@ -14,7 +14,7 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
-from hexapod_cosim.cosim.run.plan import chosen_gains
+from hexapod_cosim.cosim.run.plan import check_arguments, chosen_gains
 from hexapod_cosim.cosim.run.plant import PlantFmus
 from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate
@@ -27,6 +27,7 @@ from hexapod_cosim.cosim.run.worker_pool import (
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models.errors import check_type
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ def run_batch(
     The figures do not depend on `workers`, except for the wall time. Close the iterator
     (contextlib.closing) where the loop over it may be left early, for instance by an interrupt:
     this ends the runs under way. More than one worker needs a main module that can be imported.
-    Raises HexapodError when a worker process dies.
+    Raises HexapodError for an argument of another type, and when a worker process dies.
 
     Args:
         fmu: the plant FMU of all runs; by default one is exported for each robot.
@@ -61,6 +62,9 @@ def run_batch(
         compiled: whether the controller FMU replaces the Python controller. It is some ten times
             as fast, and the figures agree to its last digits.
     """
+    check_type(scenarios, Sequence, "a list of Scenario objects", where="scenarios")
+    for scenario in scenarios:
+        check_arguments(scenario, fmu, gains)
     with TemporaryFolder("batch") as folder:
         fmus = PlantFmus(folder, given=fmu)
         tasks = [_prepare(scenario, fmus, gains) for scenario in scenarios]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
+from types import NoneType
 
 from hexapod_cosim.controller import Gains, GainsError, Gait, make_gait
 from hexapod_cosim.cosim.interface.controller import ControllerSetup
@@ -16,6 +18,7 @@ from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
 from hexapod_cosim.cosim.scenario.schedule import Schedule, make_schedule
 from hexapod_cosim.cosim.scenario.variation import Drawn, delayed, draw
 from hexapod_cosim.models import Robot, unknown_name
+from hexapod_cosim.models.errors import check_type
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +31,13 @@ class RunPlan:
     controller: ControllerSetup
     schedule: Schedule
     drawn: Drawn | None  # None: nothing is varied
+
+
+def check_arguments(scenario: Scenario, fmu: Path | None, gains: Gains | None) -> None:
+    """Raises HexapodError for an argument of a run that has another type."""
+    check_type(scenario, Scenario, "a Scenario, as of load_scenario()", where="scenario")
+    check_type(fmu, (str, Path, NoneType), "the path of an FMU", where="fmu")
+    check_type(gains, (Gains, NoneType), "gains, as of load_gains()", where="gains")
 
 
 def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> RunPlan:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
+from types import NoneType
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.temporary import Closing, TemporaryFolder
@@ -27,7 +28,7 @@ from hexapod_cosim.cosim.master.sensors import errors_of
 from hexapod_cosim.cosim.results.facts import COMPILED, Result
 from hexapod_cosim.cosim.results.metrics import metric_columns
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
-from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
+from hexapod_cosim.cosim.run.plan import RunPlan, check_arguments, make_plan
 from hexapod_cosim.cosim.run.plant import (
     PlantFmus,
     different_settings,
@@ -39,6 +40,7 @@ from hexapod_cosim.cosim.scenario.controls import FMU, PYTHON, control_of
 from hexapod_cosim.cosim.scenario.events import SensorFault
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError, Robot
+from hexapod_cosim.models.errors import check_type
 
 MAX_SETTINGS = 64  # robots whose settings are kept
 
@@ -65,6 +67,8 @@ class Runner(Closing):
     def __init__(
         self, *, fmu: Path | None = None, controller: Path | None = None, everything: bool = False
     ) -> None:
+        for path, name in ((fmu, "fmu"), (controller, "controller")):
+            check_type(path, (str, Path, NoneType), "the path of an FMU", where=name)
         self._given_controller, self._everything = controller, everything
         self._open = ExitStack()
         self._folder = self._open.enter_context(TemporaryFolder("runner"))
@@ -93,6 +97,7 @@ class Runner(Closing):
         and a built-in control whose sensors read NaN, which FMUs refuse. Raises HexapodError when
         the run cannot start; how a run that started ended is in the result.
         """
+        check_arguments(scenario, fmu, gains)
         control = control_of(scenario.control)
         path = self._fmus.fmu(scenario.robot) if fmu is None else fmu
         if control.is_builtin and not reads_no_numbers(scenario):

@@ -44,7 +44,7 @@ from hexapod_cosim.cosim.results.warnings import (
     walk_warnings,
 )
 from hexapod_cosim.cosim.results.window import View
-from hexapod_cosim.cosim.run.plan import RunPlan, make_plan
+from hexapod_cosim.cosim.run.plan import RunPlan, check_arguments, make_plan
 from hexapod_cosim.cosim.run.plant import initialise_plant, open_plant, run_surface
 from hexapod_cosim.cosim.scenario.controls import control_of
 from hexapod_cosim.cosim.scenario.events import event_log
@@ -77,6 +77,7 @@ def simulate(
         law: a controller object or its class, which replaces the scenario's control.
         label: of that law; by default the name of its class.
     """
+    check_arguments(scenario, fmu, gains)
     if law is not None:
         scenario = replace(scenario, control=text_of_law(law, label))
     plan = make_plan(scenario, gains=gains)

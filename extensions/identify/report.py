@@ -66,7 +66,7 @@ def column_differences(log: Log, names: Sequence[str], simulated: Array) -> list
                     unit=channel.unit,
                     columns=1,
                     spread=float(np.std(measured[known])),
-                    rms=_rms(size[known]),
+                    rms=rms(size[known]),
                     largest=float(size[worst]),
                     at=float(log.time[worst]),
                 )
@@ -85,14 +85,15 @@ def channel_differences(columns: Sequence[Difference]) -> list[Difference]:
                 replace(
                     worst,
                     columns=len(own),
-                    spread=_rms(np.array([one.spread for one in own])),
-                    rms=_rms(np.array([one.rms for one in own])),
+                    spread=rms(np.array([one.spread for one in own])),
+                    rms=rms(np.array([one.rms for one in own])),
                 )
             )
     return found
 
 
-def _rms(values: Array) -> float:
+def rms(values: Array) -> float:
+    """Returns the root of the mean square."""
     return float(np.sqrt(np.mean(np.square(values))))
 
 

@@ -110,6 +110,19 @@ def has_measured_friction(servo: Servo) -> bool:
     )
 
 
+def stribeck_share(servo: Servo, speed: Array) -> Array:
+    """Returns exp(-|w/w_s|^a) [1], the share of the Stribeck terms at a speed [rad/s] (eq. 50)."""
+    return np.asarray(np.exp(-(np.abs(speed / servo.stribeck_speed) ** servo.stribeck_exponent)))
+
+
+def quadratic_friction(servo: Servo, motor: Array, external: Array) -> Array:
+    """Returns the quadratic term of eq. 50 [N m]: where the external torque opposes the motor's."""
+    m, e = np.abs(motor), np.abs(external)
+    weaker = np.where(m < e, servo.quadratic_motor_friction * m**2, 0.0)
+    squares = np.where(e < m, servo.quadratic_external_friction * e**2, weaker)
+    return np.where(motor * external < 0.0, squares, 0.0)
+
+
 def friction_budget(servo: Servo, speed: Array, motor: Array, external: Array) -> Array:
     """Returns the largest dry friction of motor and gear [N m] (eq. 50 without its viscous term).
 
@@ -122,20 +135,14 @@ def friction_budget(servo: Servo, speed: Array, motor: Array, external: Array) -
         servo.stribeck_motor_load_friction * motor
         - servo.stribeck_external_load_friction * external
     )
-    opposed = motor * external < 0.0
-    squares = np.where(
-        np.abs(motor) > np.abs(external),
-        servo.quadratic_external_friction * external**2,
-        servo.quadratic_motor_friction * motor**2,
-    )
-    quadratic = np.where(opposed & (np.abs(motor) != np.abs(external)), squares, 0.0)
-    share = np.exp(-(np.abs(speed / servo.stribeck_speed) ** servo.stribeck_exponent))
+    quadratic = quadratic_friction(servo, motor, external)
+    share = stribeck_share(servo, speed)
     return np.asarray(
         servo.coulomb_friction + load + share * (servo.stribeck_friction + sticking + quadratic)
     )
 
 
-def friction_torque(servo: Servo, speed: Array, motor: Array, external: Array) -> Array:
+def measured_friction(servo: Servo, speed: Array, motor: Array, external: Array) -> Array:
     """Returns the friction of motor and gear on the child [N m] (eq. 49), in the shape of the
     inputs, those of `friction_budget`.
 
@@ -146,8 +153,8 @@ def friction_torque(servo: Servo, speed: Array, motor: Array, external: Array) -
     return -budget * np.tanh(speed / servo.friction_speed) - servo.viscous_friction * speed
 
 
-def friction_drag(servo: Servo, speed: Array, motor: Array, external: Array) -> Array:
-    """Returns minus the derivative of `friction_torque` by speed at a given budget [N m s/rad]."""
+def measured_drag(servo: Servo, speed: Array, motor: Array, external: Array) -> Array:
+    """Returns minus the slope of `measured_friction` by speed at a given budget [N m s/rad]."""
     budget = friction_budget(servo, speed, motor, external)
     steep = 1.0 - np.tanh(speed / servo.friction_speed) ** 2
     return budget / servo.friction_speed * steep + servo.viscous_friction
@@ -156,7 +163,7 @@ def friction_drag(servo: Servo, speed: Array, motor: Array, external: Array) -> 
 BUS_MARGIN = 1e-9  # s  transmissions this early or late are on time
 
 
-def warmed(
+def warm_servo(
     servo: Servo, winding: Array, housing: Array, h: float, copper: Array, gear: Array
 ) -> tuple[Array, Array]:
     """Returns the temperatures [K] of winding and housing after a step of h [s] (eq. 52).

@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from inspect import getsourcelines
 from pathlib import Path
 from typing import Any
@@ -18,15 +19,23 @@ from command import Call, assert_refused
 import hexapod_cosim
 from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Measurement, make_gait
 from hexapod_cosim.cosim.control.new_law import class_name, module_name, write_law
+from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
+from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.metric_table import METRICS
-from hexapod_cosim.cosim.scenario.reading import scenario_from_table
+from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.run.batch import run_batch
+from hexapod_cosim.cosim.run.runner import Runner
+from hexapod_cosim.cosim.run.single_run import simulate as run_scenario
+from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import read_tables, with_values
 from hexapod_cosim.models import HexapodError, Robot, load_robot, robot_from_table
 
 NEEDS_PUBLIC_CALL = pytest.mark.usefixtures("plant_build")
 SHORT = {"duration": 0.3}
 CYCLES = {"duration": 3, "gait.period": 0.8}
+ROBOT, FLAT = load_robot("athena"), load_scenario("walk_flat")
+CONTROLLER = {"robot": ROBOT, "period": 0.005, "gait": make_gait(ROBOT)}
 
 
 class Stand:
@@ -218,6 +227,44 @@ def test_arguments_of_another_type_are_refused(arguments: dict[str, Any], where:
     assert "expected" in str(refused.value)
 
 
+def batch(scenarios: Any) -> list[Summary]:
+    return list(run_batch(scenarios))
+
+
+@pytest.mark.parametrize(
+    ("call", "arguments", "message"),
+    [
+        (export_fmu, {"robot": "athena", "path": "a.fmu"}, "robot: {}: got 'athena'"),
+        (export_fmu, {"robot": ROBOT, "path": 3}, "path: {}: got 3"),
+        (export_controller, {"setup": "paper", "path": "c.fmu"}, "setup: {}: got 'paper'"),
+        (Fmu, {"path": 3}, "path: {}: got 3"),
+        (Runner, {"fmu": 3}, "fmu: {}: got 3"),
+        (Runner.simulate, {"self": None, "scenario": "walk_flat"}, "scenario: {}: got 'walk_flat'"),
+        (run_scenario, {"scenario": "walk_flat"}, "scenario: {}: got 'walk_flat'"),
+        (run_scenario, {"scenario": FLAT, "gains": "a.toml"}, "gains: {}: got 'a.toml'"),
+        (batch, {"scenarios": None}, "scenarios: {}: got 'nothing (None)'"),
+        (batch, {"scenarios": ["flat"]}, "scenario: {}: got 'flat'"),
+        (Controller, CONTROLLER | {"robot": "athena"}, "robot: {}: got 'athena'"),
+        (Controller, CONTROLLER | {"gait": "tripod"}, "gait: {}: got 'tripod'"),
+        (Controller, CONTROLLER | {"period": "5 ms"}, "period: {}: got '5 ms'"),
+        (Controller, CONTROLLER | {"gains": "stiff"}, "gains: {}: got 'stiff'"),
+        (Controller, CONTROLLER | {"law": None}, "unknown law: expected one of"),
+        (load_robot, {"path_or_name": None}, "path: {}: got 'nothing (None)'"),
+        (make_gait, {"robot": "athena"}, "robot: {}: got 'athena'"),
+        (make_gait, {"robot": ROBOT, "name": 3}, "name: {}: got 3"),
+        (make_gait, {"robot": ROBOT, "duty": "half"}, "duty: {}: got 'half'"),
+        (make_gait, {"robot": ROBOT, "step_height": "high"}, "step_height: {}: got 'high'"),
+        (robot_from_table, {"table": 3, "where": "mine"}, "mine: wrong type: got 3"),
+    ],
+)
+def test_calls_refuse_arguments_of_another_type(
+    call: Callable[..., object], arguments: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(HexapodError) as refused:
+        call(**arguments)
+    assert str(refused.value).startswith(message.format("wrong type of an argument"))
+
+
 @pytest.mark.parametrize("results", [3, [], [3]])
 def test_a_report_of_no_result_is_refused(results: Any, tmp_path: Path) -> None:
     with pytest.raises(HexapodError, match="results: wrong type of an argument"):
@@ -244,32 +291,6 @@ def test_numbers_of_numpy_are_settings() -> None:
     plan = scenario_from_table(table, where="walk_flat.toml")
     assert (plan.seed, type(plan.seed)) == (3, int)
     assert (plan.duration, type(plan.duration)) == (2.0, float)
-
-
-def test_a_controller_of_no_gait_and_a_robot_of_no_name_are_refused() -> None:
-    robot = load_robot("athena")
-    with pytest.raises(HexapodError, match="gait: wrong type of an argument"):
-        Controller(robot, period=0.005, gait="tripod")  # type: ignore[arg-type]
-    with pytest.raises(HexapodError, match="period: wrong type of an argument"):
-        Controller(robot, period="5 ms", gait=make_gait(robot))  # type: ignore[arg-type]
-    with pytest.raises(HexapodError, match="path: wrong type of an argument"):
-        load_robot(None)  # type: ignore[arg-type]
-    with pytest.raises(HexapodError, match="robot: wrong type of an argument: got 'athena'"):
-        Controller("athena", period=0.005, gait=make_gait(robot))  # type: ignore[arg-type]
-    with pytest.raises(HexapodError, match="gains: wrong type of an argument: got 'stiff'"):
-        Controller(robot, period=0.005, gait=make_gait(robot), gains="stiff")  # type: ignore[arg-type]
-    with pytest.raises(HexapodError, match="unknown law: expected one of"):
-        Controller(robot, period=0.005, gait=make_gait(robot), law=None)  # type: ignore[arg-type]
-    with pytest.raises(HexapodError, match="robot: wrong type of an argument"):
-        make_gait("athena")  # type: ignore[arg-type]
-    with pytest.raises(HexapodError, match="name: wrong type of an argument: got 3"):
-        make_gait(robot, 3)  # type: ignore[arg-type]
-    with pytest.raises(HexapodError, match="duty: wrong type of an argument: got 'half'"):
-        make_gait(robot, duty="half")  # type: ignore[arg-type]
-    with pytest.raises(HexapodError, match="step_height: wrong type of an argument: got 'high'"):
-        make_gait(robot, step_height="high")  # type: ignore[arg-type]
-    with pytest.raises(HexapodError, match="mine: wrong type: got 3, expected a table"):
-        robot_from_table(3, where="mine")  # type: ignore[arg-type]
 
 
 def test_a_step_without_a_command_is_refused() -> None:

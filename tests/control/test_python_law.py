@@ -73,13 +73,42 @@ def test_a_class_without_step_is_refused(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_an_exception_is_told_in_one_line_with_the_users_line(
+def test_an_exception_is_explained_in_one_line_with_the_users_line(
     text: str, message: str, tmp_path: Path
 ) -> None:
     with pytest.raises(ControllerError) as caught:
         made(tmp_path, text)
     assert str(caught.value).startswith(f"{tmp_path / 'law.py'}, {message}")
     assert "\n" not in str(caught.value)
+
+
+def test_a_step_with_other_arguments_is_refused_before_the_run(tmp_path: Path) -> None:
+    path = written(tmp_path, "class Law:\n    def step(self, t, command): ...\n")
+    law = build(load_class(path, "Law"), path, GIVEN, {})
+    with pytest.raises(ControllerError) as caught:
+        PythonLaw(law, path=path)
+    assert str(caught.value) == (
+        f"{path}: Law.step takes other arguments: got 'step(t, command)', expected "
+        "step(t, command, measurement); write `def step(self, t, command, measurement):`"
+    )
+
+
+def test_a_class_of_c_code_has_no_step() -> None:
+    with pytest.raises(ControllerError, match=r"^builtins: dict has no method step"):
+        build(dict, Path("builtins"), GIVEN, {})
+
+
+def test_an_exception_outside_the_users_file_quotes_no_line_of_ours(tmp_path: Path) -> None:
+    path = written(tmp_path, "")
+
+    class Law:
+        def step(self, t: float, command: BodyCommand, measurement: Measurement) -> Any:
+            return [[1.0, 2.0], [3.0]]  # no array
+
+    with pytest.raises(ControllerError) as caught:
+        stepped(Law(), path)
+    assert str(caught.value).startswith(f"{path}: ValueError: setting an array element")
+    assert str(caught.value).endswith("; correct the controller")
 
 
 def test_joint_angles_alone_are_a_command() -> None:

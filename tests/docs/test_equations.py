@@ -6,6 +6,7 @@ A citation is `eq. N`, `eq. N-M`, or a list of these. The source's own equations
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
@@ -18,6 +19,73 @@ TAG = re.compile(r"\\tag\{([^}]*)\}")
 CITED = re.compile(r"(paper )?\b[Ee]qs?\. (\d+(?:(?:-|, | and )\d+\b(?!\.\d))*)")
 # equations of one form only: the sweep in O(n), to which models/ is dense, and the complex step
 IN_C_ALONE = {8, 9, 10, 11, 25, 55}
+# a C function with the comment above it that says what it computes
+FUNCTION = re.compile(
+    r"/\*((?:(?!\*/).)*)\*/\n(?:HX_\w+ |static |inline )*\w+ \*?(\w+)\([^;{}]*\) \{", re.DOTALL
+)
+# the modules of models/ with the equations of a file of plant_fmu/src
+TWINS = {
+    "command/command.c": ["servos/motor"],
+    "contact_law.c": ["contact/law"],
+    "ground/soil_law.h": ["soil/law"],
+    "kernels/integrator.h": ["integrator", "measure"],
+    "kernels/output.h": ["energy"],
+    "kernels/step.h": ["step"],
+    "lanes/actuator.h": ["actuator", "servos/motor"],
+    "lanes/dynamics.h": ["dynamics"],
+    "lanes/foot.h": ["contact/law", "contact/forces"],
+    "lanes/forces.h": ["dynamics", "actuator"],
+    "lanes/friction.h": ["friction", "contact/geometry"],
+    "lanes/soil_path.h": ["method", "contact/switching"],
+    "lanes/stage.h": ["stage"],
+    "measure/foot_measure.h": ["measure"],
+    "measure/joint_measure.h": ["servos/motor"],
+    "measure/works.h": ["measure"],
+    "method.h": ["integrator"],
+    "packs/vec3.h": ["kinematics"],
+    "robot/laws.c": [],
+}
+# functions that cite an equation and have no counterpart in models/, with the reason
+OF_SWEEP = "the O(n) solution, to which models/dynamics.py and models/stage.py are dense"
+OF_LANES = "chooses in each lane between soil and rigid ground; `contact_force` does for a contact"
+OF_PLACE = "reads or stores numbers of an equation that another function computes"
+IN_C_WITH_REASON = {
+    "joint_bias": OF_SWEEP,
+    "couple_rotor": OF_SWEEP,
+    "rotor_coupling": OF_SWEEP,
+    "sweep_inertia": OF_SWEEP,
+    "sweep_force": OF_SWEEP,
+    "sweep_inverse": OF_SWEEP,
+    "sweep_motion": OF_SWEEP,
+    "sweep_sum": OF_SWEEP,
+    "rotor_motion": OF_SWEEP,
+    "torso_acceleration": OF_SWEEP,
+    "leg_multipliers": OF_SWEEP,
+    "gear_frictions": OF_SWEEP,
+    "turning_drag": OF_SWEEP,
+    "bristle_response": OF_SWEEP,
+    "stage_bristle_rate": OF_SWEEP,
+    "store_torso_rate": OF_SWEEP,
+    "store_link_rate": OF_SWEEP,
+    "dynamics_evaluate": OF_SWEEP,
+    "soil_load": OF_LANES,
+    "replace_by_soil": OF_LANES,
+    "with_soil": OF_LANES,
+    "store_powers": OF_PLACE,
+    "add_impulses": OF_PLACE,
+    "fill_energy": OF_PLACE,
+    "move_drive": OF_PLACE,
+    "compile_gear": OF_PLACE,
+    "friction_direction": "the column `direction` of the table of laws in models/friction.py",
+    "exact": "a column of the table of laws, which calls `exact_restitution_chi`",
+    "mud": "the mud's case of `virgin_force`",
+    "shear_base": "`shear_limit` without the load's part, which lanes add",
+    "supply_share": "the voltage of `supply_power`, whose other part is `duty_share`",
+    "spin_energy": "the rotors' part of `kinetic_energy`",
+    "push_work": "the push's part of the works of a step, which `step_works` leaves out",
+    "contact_works": "the loop over feet in `step_works`",
+    "cone_with_soil": "the cone on soil; `measure_cone` is for rigid ground",
+}
 TEXTS = {".c", ".h", ".py", ".md", ".toml", ".ipynb", ".cpp"}
 
 
@@ -73,3 +141,47 @@ def test_every_citation_names_an_equation_that_exists() -> None:
             where = path.relative_to(ROOT)
             assert numbers <= allowed, f"{where}: {words}: expected one of {sorted(allowed)}"
     assert count > 100
+
+
+def functions_of_the_plant() -> list[tuple[str, str]]:
+    """File and name, without hx_, of the C functions whose comment cites an equation."""
+    found, source = [], ROOT / "plant_fmu" / "src"
+    for path in sorted(path for path in source.rglob("*") if path.suffix in {".c", ".h"}):
+        for comment, name in FUNCTION.findall(path.read_text(encoding="utf-8")):
+            if citations(comment):
+                found.append((path.relative_to(source).as_posix(), name.removeprefix("hx_")))
+    return found
+
+
+def functions_of_models(module: str) -> set[str]:
+    tree = ast.parse((ROOT / "models" / f"{module}.py").read_text(encoding="utf-8"))
+    return {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
+def test_a_function_of_the_plant_has_the_name_of_its_equation_in_models() -> None:
+    alone = set()
+    for file, name in functions_of_the_plant():
+        if not any(name in functions_of_models(module) for module in TWINS[file]):
+            alone.add(name)
+    assert alone == set(IN_C_WITH_REASON)
+
+
+@pytest.mark.parametrize(
+    ("file", "names"),
+    [
+        (
+            "lanes/friction.h",
+            "stribeck_curve friction_drag bristle_friction lugre_friction turning_moment",
+        ),
+        (
+            "lanes/actuator.h",
+            "motor_torque servo_torque servo_slopes stribeck_share quadratic_friction "
+            "measured_friction stop_torque",
+        ),
+        ("lanes/foot.h", "normal_force"),
+        ("measure/foot_measure.h", "measure_feet measure_landing measure_cone"),
+    ],
+)
+def test_the_laws_of_a_file_have_their_names_in_both_languages(file: str, names: str) -> None:
+    ours = {name for of, name in functions_of_the_plant() if of == file}
+    assert ours - set(IN_C_WITH_REASON) == set(names.split())

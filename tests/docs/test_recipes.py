@@ -154,7 +154,7 @@ def compiled_drag(copy: Path, *, law: int, slope: float, speed: float) -> float:
         "  static hxModel model;\n"
         "  model.friction_law = law, model.slope = slope;\n"
         "  double drag[HX_LANES];\n"
-        "  hx_store(drag, hx_friction(&model, hx_splat(speed)));\n"
+        "  hx_store(drag, hx_friction_direction(&model, hx_splat(speed)));\n"
         "  return drag[0];\n}\n",
         encoding="utf-8",
     )

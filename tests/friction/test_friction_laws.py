@@ -71,7 +71,7 @@ def test_the_plants_laws_are_the_twins(
             force = -friction_force(friction, 1.0, slip, bristle)
             twin = [*force, *bristle_rate(friction, slip, bristle)]
             assert got[:6] == pytest.approx(twin, rel=SAME, abs=SAME)
-            expected = (slopes.stiffness, slopes.damping, slopes.beta)
+            expected = (slopes.stiffness, slopes.damping, slopes.relaxation)
             assert got[6:] == pytest.approx(expected, rel=SAME)
 
 

@@ -158,7 +158,7 @@ def test_a_walk_in_soil_is_the_twins(core: ct.CDLL, soil: str, pad: float) -> No
 
 
 def test_a_robot_that_hops_into_its_footprints_moves_as_the_twin(core: ct.CDLL) -> None:
-    """It is pulled out of dry sand, which leaves six prints, and comes down into them."""
+    """It is pulled out of dry sand, which leaves six footprints, and comes down into them."""
     robot = replace(FEET, soil=soil_preset("dry_sand").soil)
     robot = changed(robot, foot={"pad_radius": 0.025})
     pair = Pair(core, robot, stood(robot, height=1e-4, velocity=(0.0, 0.0, -0.3)))

@@ -22,8 +22,8 @@ from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.kinematics import joint_angles, joint_speeds
 from hexapod_cosim.models.measure import (
     Impulses,
-    cone_time,
-    landing_rate,
+    measure_cone,
+    measure_landing,
     measured_step,
     step_works,
 )
@@ -78,7 +78,10 @@ def test_a_step_s_measures_are_those_of_the_readable_equations(
     output, after = plant.output(command), plant.bodies
     works = step_works(robot, before, after, H, Impulses(*sums), ~np.isnan(damping))
     np.testing.assert_allclose(
-        output.cone_time, cone_time(robot, before, after, H, Impulses(*sums)), rtol=0.0, atol=1e-15
+        output.cone_time,
+        measure_cone(robot, before, after, H, Impulses(*sums)),
+        rtol=0.0,
+        atol=1e-15,
     )
     assert float(np.sum(output.cone_time[:30])) > 0.0
     measured = measured_step(robot, before, after, H, command, works.motor, damping)
@@ -154,7 +157,7 @@ def test_the_rise_of_a_landing_is_that_of_the_readable_equations(
             contact_damping(robot.contact, v) if on else np.nan
             for on, v in zip(closed[:-1], speed, strict=False)
         ]
-        expected.append(landing_rate(robot, time[first:], delta, ddelta, np.array(damping)))
+        expected.append(measure_landing(robot, time[first:], delta, ddelta, np.array(damping)))
     assert min(expected) > 100.0
     assert len({round(each) for each in expected}) == 6
     np.testing.assert_allclose(output.foot.landing_rate, expected, rtol=1e-6)

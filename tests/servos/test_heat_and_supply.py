@@ -18,7 +18,7 @@ from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.contact.geometry import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.kinematics import joint_angles, joint_speeds
-from hexapod_cosim.models.servos.motor import duty_share, held_commands, supply_power, warmed
+from hexapod_cosim.models.servos.motor import duty_share, held_commands, supply_power, warm_servo
 
 WARM: dict[str, Any] = {
     "winding_capacity": 5.0,
@@ -75,7 +75,7 @@ def test_friction_warms_the_housing_and_the_twin_agrees(core: ct.CDLL) -> None:
     copper = servo.resistance * squared / servo.torque_constant**2
     gear = after.energy.gear_loss / 6.0
     start = np.array(AIR)
-    winding, housing = warmed(servo, start, start, 1e-3, np.array(copper), np.array(gear))
+    winding, housing = warm_servo(servo, start, start, 1e-3, np.array(copper), np.array(gear))
     assert after.winding_temperature[0, 2] - AIR == pytest.approx(float(winding) - AIR, rel=1e-5)
     assert after.housing_temperature[0, 2] - AIR == pytest.approx(float(housing) - AIR, rel=1e-5)
     assert float(housing) > AIR

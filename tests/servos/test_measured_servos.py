@@ -34,8 +34,8 @@ from hexapod_cosim.models.schema import require
 from hexapod_cosim.models.servos.motor import (
     Power,
     electrical_power,
-    friction_drag,
-    friction_torque,
+    measured_drag,
+    measured_friction,
     motor_current,
     motor_torque,
 )
@@ -82,7 +82,7 @@ def test_the_plants_servos_are_the_twins(core: ct.CDLL, name: str, mode: str) ->
         assert got[3] == pytest.approx(slopes[1][0] + drag, rel=SAME, abs=SAME)
         clipped += slopes[0][0] == 0.0
         at = [np.array([value]) for value in (speed, motor, external)]
-        gear = [friction_torque(servo, *at)[0], friction_drag(servo, *at)[0]]
+        gear = [measured_friction(servo, *at)[0], measured_drag(servo, *at)[0]]
         theirs = probed(core.hx_probe_gear, plant, speed, motor, external, size=2)
         assert theirs == pytest.approx(gear, rel=SAME, abs=SAME)
     assert clipped > 0

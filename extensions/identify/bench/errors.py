@@ -10,7 +10,7 @@ import numpy as np
 from hexapod_cosim.extensions.identify.bench.fit import ServoFit
 from hexapod_cosim.extensions.identify.bench.log import BenchLog
 from hexapod_cosim.extensions.identify.bench.pendulum import Bench, Swing
-from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.extensions.identify.report import rms
 from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.servos.motor import torque_per_volt
 
@@ -49,14 +49,10 @@ def log_errors(bench: Bench, swing: Swing, servo: Servo) -> list[Errors]:
                 angle=float(np.degrees(np.mean(np.abs(angle - log.angle)))),
                 speed=float(np.mean(np.abs(speed - log.speed))),
                 duty=float(np.mean(np.abs(duty - log.duty)[on])),
-                torque=_rms(torque - true) / _rms(true),
+                torque=rms(torque - true) / rms(true),
             )
         )
     return found
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def judged(found: ServoFit, logs: Sequence[BenchLog]) -> list[Errors]:

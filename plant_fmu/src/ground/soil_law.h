@@ -52,8 +52,8 @@ static inline hxSoilCurves select_curves(hxMask mask, hxSoilCurves a, hxSoilCurv
 
 /* Returns the integral of (local depth)^n over the foot, and its slope (eq. 41), times a pressure
  * modulus. p = z^n; q = (z - R)^n of a sphere deeper than R. */
-static inline hxSoilCurves columns(const hxSoils *soil, hxReal modulus, hxReal n, hxReal z,
-                                   hxReal p, hxReal q) {
+static inline hxSoilCurves column_sum(const hxSoils *soil, hxReal modulus, hxReal n, hxReal z,
+                                      hxReal p, hxReal q) {
   const hxReal zero = hx_splat(0.0), R = soil->radius, flat = modulus * (soil->area * p);
   const hxReal above = hx_max(z - R, zero), one = 1.0 / (n + 1.0), two = one / (n + 2.0),
                scale = 2.0 * pi * modulus;
@@ -67,11 +67,11 @@ static inline hxSoilCurves bekker(const hxSoils *soil, hxReal z) {
   const hxReal n = soil->exponent, zero = hx_splat(0.0), above = z - soil->radius;
   const hxMask full = hx_less(zero, above) & hx_less(soil->pad, hx_splat(0.5));
   const hxReal q = hx_any(full) ? hx_select(full, hx_lanes_pow(above, n), zero) : zero;
-  return columns(soil, soil->modulus, n, z, hx_lanes_pow(z, n), q);
+  return column_sum(soil, soil->modulus, n, z, hx_lanes_pow(z, n), q);
 }
 
 /* eq. 42; e is the depth in radii */
-static inline hxSoilCurves granular(const hxSoils *soil, hxReal z) {
+static inline hxSoilCurves granular_sum(const hxSoils *soil, hxReal z) {
   const hxReal down = soil->down, side = soil->side, R = soil->radius;
   const hxReal e = z / R, o = 1.0 - e, rest = down - side, flat = down * soil->area;
   const hxSoilCurves shallow = {
@@ -88,20 +88,20 @@ static inline hxSoilCurves granular(const hxSoils *soil, hxReal z) {
 /* eq. 43 */
 static inline hxSoilCurves mud(const hxSoils *soil, hxReal z) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
-  const hxSoilCurves yield = columns(soil, soil->yield, zero, z, one, one);
-  const hxSoilCurves hard = columns(soil, soil->hardening, one, z, z, z - soil->radius);
+  const hxSoilCurves yield = column_sum(soil, soil->yield, zero, z, one, one);
+  const hxSoilCurves hard = column_sum(soil, soil->hardening, one, z, z, z - soil->radius);
   return (hxSoilCurves){yield.force + hard.force, yield.slope + hard.slope};
 }
 
 /* Returns F_v(z), the force of a first monotone loading, and its slope (eq. 40-43). */
-static inline hxSoilCurves hx_virgin(const hxSoils *soil, hxReal z) {
+static inline hxSoilCurves hx_virgin_force(const hxSoils *soil, hxReal z) {
   const hxReal zero = hx_splat(0.0);
   const hxMask deep = hx_less(zero, z), is_bekker = deep & has_law(soil, HX_SOIL_BEKKER),
                is_granular = deep & has_law(soil, HX_SOIL_GRANULAR),
                is_mud = deep & has_law(soil, HX_SOIL_MUD);
   hxSoilCurves virgin = {zero, zero};
   if (hx_any(is_bekker)) virgin = select_curves(is_bekker, bekker(soil, z), virgin);
-  if (hx_any(is_granular)) virgin = select_curves(is_granular, granular(soil, z), virgin);
+  if (hx_any(is_granular)) virgin = select_curves(is_granular, granular_sum(soil, z), virgin);
   if (hx_any(is_mud)) virgin = select_curves(is_mud, mud(soil, z), virgin);
   return virgin;
 }
@@ -114,8 +114,8 @@ static inline hxReal hx_plastic_depth(const hxSoils *soil, hxReal z, hxSoilCurve
 }
 
 /* Returns min(A Ke (z - z_p), F_v(z)) of feet deeper than z_p, and its slope. */
-static inline hxSoilCurves elastic(const hxSoils *soil, hxReal plastic, hxReal z,
-                                   hxSoilCurves virgin) {
+static inline hxSoilCurves elastic_force(const hxSoils *soil, hxReal plastic, hxReal z,
+                                         hxSoilCurves virgin) {
   const hxSoilCurves line = {soil->unloading * (z - plastic), soil->unloading};
   return select_curves(hx_less(virgin.force, line.force), virgin, line);
 }
@@ -139,14 +139,14 @@ static inline hxSoilCurves contact_area(const hxSoils *soil, hxReal z) {
 
 /* Returns f_n of feet at depth z that sink at dz, with the virgin curve at z (eq. 44, 45); 0 where
  * z <= z_p. */
-static inline hxSoilForces hx_soil_forces(const hxSoils *soil, hxReal plastic, hxReal z, hxReal dz,
-                                          hxSoilCurves virgin) {
+static inline hxSoilForces hx_soil_normal_force(const hxSoils *soil, hxReal plastic, hxReal z,
+                                                hxReal dz, hxSoilCurves virgin) {
   const hxReal zero = hx_splat(0.0);
   const hxMask touches = hx_less(plastic, z);
   if (!hx_any(touches)) return (hxSoilForces){zero, zero, zero, zero, zero};
   const hxMask yields = hx_is_yielding(soil, plastic, z, dz, virgin.force);
   const hxSoilCurves area = contact_area(soil, z);
-  hxSoilCurves spring = elastic(soil, plastic, z, virgin);
+  hxSoilCurves spring = elastic_force(soil, plastic, z, virgin);
   if (HX_HAS_SLOPES) spring = select_curves(yields, virgin, spring); /* for its derivative */
   const hxReal viscosity = soil->damping * area.force, force = spring.force + viscosity * dz;
   const hxMask pushes = touches & hx_less(zero, force);
@@ -164,7 +164,7 @@ static inline hxReal hx_stored_energy(const hxSoils *soil, hxReal plastic, hxRea
                                       hxSoilCurves virgin) {
   const hxMask touches = hx_less(plastic, z);
   if (!hx_any(touches)) return hx_splat(0.0);
-  const hxReal force = elastic(soil, plastic, z, virgin).force;
+  const hxReal force = elastic_force(soil, plastic, z, virgin).force;
   return hx_select(touches, force * force / (2.0 * soil->unloading), hx_splat(0.0));
 }
 
@@ -208,7 +208,7 @@ typedef struct {
 static inline hxSoilContacts hx_soil_contacts(const hxSoils *soil, hxReal plastic, hxReal z,
                                               hxReal dz, hxSoilCurves virgin) {
   const hxReal zero = hx_splat(0.0);
-  const hxSoilForces f = hx_soil_forces(soil, plastic, z, dz, virgin);
+  const hxSoilForces f = hx_soil_normal_force(soil, plastic, z, dz, virgin);
   /* the depth of shear does not fall below z_p: a foot that leaves the ground within a step keeps
    * its grip to the end of the step */
   const hxMask above = hx_less(z, plastic);

@@ -159,7 +159,7 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   if (model->has_soil) {
     path.ends = &scratch->soil;
     hx_soil_ends(&state->contact, &state->moment, end, 0, &scratch->soil);
-    hx_soil_yield(&state->contact, h, &state->moment, end, path.ends, path.plastic);
+    hx_yield_soil(&state->contact, h, &state->moment, end, path.ends, path.plastic);
   }
   trapezoidal_impulses(model, &scratch->work, h, &state->completed, &impulses);
   if (!known)

@@ -183,7 +183,7 @@ static void measure_step(const hxStart *start, const hxModel *seen, double h, co
     hxSoilEnds *ends = &start->scratch->soil;
     path.ends = ends;
     hx_soil_ends(start->contact, &state->moment, end, start->scratch->is_soil_known, ends);
-    hx_soil_yield(start->contact, h, &state->moment, end, ends, path.plastic);
+    hx_yield_soil(start->contact, h, &state->moment, end, ends, path.plastic);
   }
   hx_step_works(&path, &trial->impulses, &works);
   hxMeasured *measured = &state->measured;

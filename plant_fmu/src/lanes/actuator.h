@@ -40,8 +40,8 @@ static inline hxPower hx_power_of(const hxCommand *command, int joint, int slot)
 
 /* Returns the torque and the limits of a motor whose voltage is limited (eq. 48). The back-EMF
  * lowers the torque of a given voltage; in torque mode the voltage makes up for it. */
-static inline hxMotor voltage_motor(const hxModel *model, hxReal speed, hxReal wanted,
-                                    hxPower power) {
+static inline hxMotor motor_torque(const hxModel *model, hxReal speed, hxReal wanted,
+                                   hxPower power) {
   const hxReal brake = model->back_emf * speed, stall = model->stall_torque * power.limit;
   const hxReal most = hx_splat(model->current_torque);
   const hxReal high = power.strength * hx_clip(most, -stall - brake, stall - brake),
@@ -51,13 +51,13 @@ static inline hxMotor voltage_motor(const hxModel *model, hxReal speed, hxReal w
 }
 
 /* Returns the motor's torque and its limits (eq. 12, 48). */
-static inline hxMotor hx_motor_torque(const hxModel *model, hxReal angle, hxReal speed,
+static inline hxMotor hx_servo_torque(const hxModel *model, hxReal angle, hxReal speed,
                                       hxReal angle_ref, hxReal speed_ref, hxReal torque_ref,
                                       hxPower power) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxReal wanted =
       model->kp * (angle_ref - angle) + model->kd * (speed_ref - speed) + torque_ref;
-  if (model->servo_drive == HX_DRIVE_MOTOR) return voltage_motor(model, speed, wanted, power);
+  if (model->servo_drive == HX_DRIVE_MOTOR) return motor_torque(model, speed, wanted, power);
   const hxReal load = speed * (1.0 / model->speed_max);
   const hxReal most = model->torque_max * power.strength;
   const hxReal high = most * hx_clip(1.0 - load, zero, one);
@@ -66,12 +66,12 @@ static inline hxMotor hx_motor_torque(const hxModel *model, hxReal angle, hxReal
 }
 
 /* Returns the motor's torque, the gear's Coulomb friction and their derivatives (eq. 12, 48). */
-static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal speed,
+static inline hxServo hx_servo_slopes(const hxModel *model, hxReal angle, hxReal speed,
                                       hxReal angle_ref, hxReal speed_ref, hxReal torque_ref,
                                       hxPower power) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxMotor motor =
-      hx_motor_torque(model, angle, speed, angle_ref, speed_ref, torque_ref, power);
+      hx_servo_torque(model, angle, speed, angle_ref, speed_ref, torque_ref, power);
   const hxMask free = hx_less(motor.low, motor.wanted) & hx_less(motor.wanted, motor.high);
   /* falling: the torque is limited by the sloping part of the torque-speed line, or the voltage */
   const hxMask falling =

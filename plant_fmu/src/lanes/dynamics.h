@@ -271,7 +271,7 @@ static inline void store_bristle_rates(const hxModel *model, const hxContactStat
                                        hxPlantMotion *rate) {
   for (int pack = 0; pack < HX_PACKS; ++pack)
     hx_store_vec3(rate->bristle, pack * HX_LANES,
-                  bristle_rate(model, contact, implicit, pack, &work->pack[pack]));
+                  stage_bristle_rate(model, contact, implicit, pack, &work->pack[pack]));
   for (int i = 0; i < 3 && HX_PACKS * HX_LANES < HX_SLOTS; ++i) hx_fill_slots(rate->bristle[i]);
 }
 

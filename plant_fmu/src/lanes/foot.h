@@ -118,13 +118,13 @@ HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, 
   const hxContactKinematics *kin = &contact->kin;
   const hxSoilPack f = hx_soil_pack(state, slot, kin->delta, kin->ddelta, virgin);
   const hxVec3 b = hx_load_vec3(motion->bristle, slot), none = hx_zero3();
-  const hxReal zero = hx_splat(0.0), yield = f.per_displacement * contact->slip_speed;
+  const hxReal zero = hx_splat(0.0), relaxation = f.per_displacement * contact->slip_speed;
   const hxBristle rigid = has_friction_bristles(model, HX_FOOT)
                               ? contact->bristle
                               : (hxBristle){none, none, zero, zero, zero};
   const hxVec3 grip = hx_scale(f.per_load, b),
                rate = hx_scale(hx_load(&state->closed[HX_FOOT][slot]),
-                               hx_add_scaled(contact->slip, -yield, b));
+                               hx_add_scaled(contact->slip, -relaxation, b));
   const hxVec3 force = hx_add_scaled(hx_scale(f.force, hx_sub3(kin->normal, grip)), -f.hold, b);
   soil_load(soft, &f, contact);
   contact->hold = f.hold;
@@ -133,7 +133,7 @@ HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, 
                                  .rate = select3(soft, rate, rigid.rate),
                                  .stiffness = hx_select(soft, f.per_load, rigid.stiffness),
                                  .damping = hx_select(soft, zero, rigid.damping),
-                                 .yield = hx_select(soft, yield, rigid.yield)};
+                                 .relaxation = hx_select(soft, relaxation, rigid.relaxation)};
 }
 
 /* What is known of contacts before they are computed; NULL: nothing. */
@@ -257,7 +257,7 @@ HX_INLINE void rigid_force(const hxModel *model, int row, int slot, const hxPlan
   if (has_friction_bristles(model, row)) {
     const hxReal closed = contact->law.closed;
     const hxVec3 b = hx_load_vec3(motion->bristle, slot);
-    contact->bristle = hx_bristle_friction(model, at, closed, b, contact->slip);
+    contact->bristle = hx_friction_grip(model, at, closed, b, contact->slip);
     contact->force = hx_scale(contact->normal.force, hx_sub3(kin->normal, contact->bristle.grip));
     return;
   }
@@ -279,8 +279,8 @@ HX_INLINE void hx_contact_force(const hxModel *model, const hxContactState *stat
  * known. */
 HX_RARE void hx_contact_moment(const hxModel *model, const hxContactState *state, int row, int slot,
                                const hxVec3 *w, hxContactWork *contact) {
-  contact->turning = hx_turning_friction(model, hx_friction_at(state, row, slot),
-                                         hx_splat(model->radius[row]), contact->kin.normal, *w);
+  contact->turning = hx_turning_moment(model, hx_friction_at(state, row, slot),
+                                       hx_splat(model->radius[row]), contact->kin.normal, *w);
   contact->moment = hx_scale(contact->normal.force, contact->turning.moment);
 }
 

@@ -136,10 +136,10 @@ static inline void leg_pass(const hxModel *model, const hxCommand *command, doub
 }
 
 /* Computes the torques of motor, gear and stops on a joint (eq. 12, 39). */
-static inline void joint_torque(const hxModel *model, const hxCommand *command, int joint, int slot,
-                                hxJointWork *k) {
+static inline void joint_torques(const hxModel *model, const hxCommand *command, int joint,
+                                 int slot, hxJointWork *k) {
   k->servo =
-      hx_servo_torque(model, k->angle, k->speed, hx_load(&command->angle[joint][slot]),
+      hx_servo_slopes(model, k->angle, k->speed, hx_load(&command->angle[joint][slot]),
                       hx_load(&command->speed[joint][slot]), hx_load(&command->torque[joint][slot]),
                       hx_power_of(command, joint, slot));
   k->torque = model->servo_mode == HX_SERVO_KINEMATIC ? k->servo.friction
@@ -357,7 +357,7 @@ static inline void hx_dynamics_forces(const hxModel *model, const hxContactState
              &work->pack[pack]);
   for (int joint = 0; joint < HX_JOINTS; ++joint)
     for (int pack = 0; pack < HX_PACKS; ++pack)
-      joint_torque(model, command, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
+      joint_torques(model, command, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
   for (int pack = 0; pack < HX_PACKS; ++pack)
     leg_contacts(model, contact, motion, known, pack * HX_LANES, all, &work->pack[pack]);
   for (int pack = 0; model->spin && pack < HX_PACKS; ++pack)

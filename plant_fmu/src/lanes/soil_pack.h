@@ -69,7 +69,7 @@ HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int slot, hxReal de
   const hxSoils soil = hx_soils_under(state, slot);
   const hxReal z = hx_select(in, delta, none);
   const hxSoilContacts f = hx_soil_contacts(&soil, hx_load(&state->plastic[slot]), z, ddelta,
-                                            virgin ? *virgin : hx_virgin(&soil, z));
+                                            virgin ? *virgin : hx_virgin_force(&soil, z));
   return (hxSoilPack){.force = hx_select(in, f.normal.force, none),
                       .stiffness = hx_select(in, f.normal.stiffness, none),
                       .viscosity = hx_select(in, f.normal.viscosity, none),

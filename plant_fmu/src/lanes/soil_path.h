@@ -14,7 +14,7 @@ HX_RARE hxSoilCurves hx_virgin_under(const hxContactState *state, int slot, hxRe
   const hxMask in = hx_in_soil(state, slot);
   if (!hx_any(in)) return (hxSoilCurves){none, none};
   const hxSoils soil = hx_soils_under(state, slot);
-  return hx_virgin(&soil, hx_select(in, delta, none));
+  return hx_virgin_force(&soil, hx_select(in, delta, none));
 }
 
 /* Virgin curves under the feet at both ends of a step. */
@@ -43,8 +43,8 @@ HX_RARE hxNormalForce with_soil(const hxContactState *state, int slot, hxReal de
   if (hx_any(in)) {
     const hxSoils soil = hx_soils_under(state, slot);
     const hxReal z = hx_select(in, delta, none);
-    f = hx_soil_forces(&soil, hx_load(&state->plastic[slot]), z, ddelta,
-                       virgin ? *virgin : hx_virgin(&soil, z));
+    f = hx_soil_normal_force(&soil, hx_load(&state->plastic[slot]), z, ddelta,
+                             virgin ? *virgin : hx_virgin_force(&soil, z));
   }
   return (hxNormalForce){hx_select(soft, hx_select(in, f.force, none), rigid.force),
                          hx_select(soft, hx_select(in, f.elastic, none), rigid.elastic),
@@ -69,14 +69,14 @@ static inline double hx_deepest(double from, double slope_from, double to, doubl
 HX_RARE hxSoilCurves deepest_virgin(const hxSoils *soil, hxMask in, const hxSoilEnds *ends,
                                     int slot, hxReal deepest, hxReal from, hxReal to) {
   const hxMask within = differ(deepest, from) & differ(deepest, to);
-  if (hx_any(in & within)) return hx_virgin(soil, deepest);
+  if (hx_any(in & within)) return hx_virgin_force(soil, deepest);
   const int pack = slot / HX_LANES;
   return select_curves(differ(deepest, to), ends->from[pack], ends->to[pack]);
 }
 
 /* Computes the plastic depths of feet at the end of a step of h, by the largest depth on its path
  * (eq. 44). */
-HX_RARE void hx_soil_yield(const hxContactState *state, double h, const hxMoment *from,
+HX_RARE void hx_yield_soil(const hxContactState *state, double h, const hxMoment *from,
                            const hxMoment *to, const hxSoilEnds *ends, double plastic[HX_SLOTS]) {
   const hxContactMoment *a = &from->contact[HX_FOOT], *b = &to->contact[HX_FOOT];
   double deepest[HX_SLOTS] = {0.0};

@@ -14,11 +14,11 @@ HX_RARE hxContactSlope with_soil_slope(const hxContactState *state, int slot, hx
   hxContactSlope slope = rigid;
   slope.stiffness = hx_select(soft, ahead.stiffness, rigid.stiffness);
   slope.viscosity = hx_select(soft, ahead.viscosity, rigid.viscosity);
-  const hxReal yield = contact->bristle.yield,
-               bristle = (ahead.force * ahead.per_load + ahead.hold) / (1.0 + implicit->z * yield);
+  const hxReal relaxation = contact->bristle.relaxation, kept = 1.0 + implicit->z * relaxation;
+  const hxReal bristle = (ahead.force * ahead.per_load + ahead.hold) / kept;
   slope.drag = hx_select(soft, implicit->z * bristle, rigid.drag);
   slope.bristle = hx_select(soft, bristle, rigid.bristle);
-  slope.yield = yield;
+  slope.relaxation = relaxation;
   return slope;
 }
 
@@ -37,12 +37,12 @@ HX_INLINE hxContactSlope contact_slope(const hxModel *model, const hxContactStat
   }
   if (!has_friction_bristles(model, row)) {
     slope.drag = ahead.force * contact->drag_per_load;
-    slope.bristle = slope.yield = hx_splat(0.0);
+    slope.bristle = slope.relaxation = hx_splat(0.0);
     return has_soil(model, row) ? with_soil_slope(state, slot, deeper, contact, implicit, slope)
                                 : slope;
   }
-  slope.yield = contact->bristle.yield;
-  slope.bristle = ahead.force * contact->bristle.stiffness / (1.0 + implicit->z * slope.yield);
+  slope.relaxation = contact->bristle.relaxation;
+  slope.bristle = ahead.force * contact->bristle.stiffness / (1.0 + implicit->z * slope.relaxation);
   slope.drag = ahead.force * contact->bristle.damping + implicit->z * slope.bristle;
   return has_soil(model, row) ? with_soil_slope(state, slot, deeper, contact, implicit, slope)
                               : slope;
@@ -308,10 +308,11 @@ HX_INLINE hxVec3 contact_acceleration(const hxModel *model, hxMotion6 felt,
   return hx_add3(motion_at(felt, contact->kin.arm), hx_splat_vec3(model->gravity));
 }
 
-/* Returns db/dt of a stage (eq. 21): k = (f + s_v + z a - yield s_b)/(1 + z yield) along the
- * ground, where f is the bristle law's rate. */
-static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *state,
-                                  const hxImplicit *implicit, int pack, const hxLegWork *leg) {
+/* Returns db/dt of a stage (eq. 21): k = (f + s_v + z a - beta s_b)/(1 + z beta) along the ground,
+ * where f is the bristle law's rate and beta the bristles' relaxation rate. */
+static inline hxVec3 stage_bristle_rate(const hxModel *model, const hxContactState *state,
+                                        const hxImplicit *implicit, int pack,
+                                        const hxLegWork *leg) {
   const hxContactWork *contact = &leg->contact[HX_FOOT];
   hxVec3 rate = contact->bristle.rate;
   if (!implicit) return rate;
@@ -319,15 +320,15 @@ static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *st
   const hxVec3 n = contact->kin.normal,
                dv = hx_add_scaled(contact->speed_shift, hx_splat(implicit->z),
                                   contact_acceleration(model, felt, contact));
-  const hxReal yield = implicit->slope[pack].contact[HX_FOOT].yield;
+  const hxReal relaxation = implicit->slope[pack].contact[HX_FOOT].relaxation;
   hxReal closed = hx_load(&state->closed[HX_FOOT][pack * HX_LANES]);
   if (!has_friction_bristles(model, HX_FOOT)) /* rigid ground beside soil has no bristles */
     closed *= hx_load(&state->on_soil[pack * HX_LANES]);
   rate = hx_add_scaled(rate, closed, hx_add_scaled(dv, -hx_dot(n, dv), n));
   if (implicit->change)
-    rate = hx_add_scaled(rate, -yield,
+    rate = hx_add_scaled(rate, -relaxation,
                          hx_load_vec3(implicit->change->motion.bristle, pack * HX_LANES));
-  return hx_scale(1.0 / (1.0 + implicit->z * yield), rate);
+  return hx_scale(1.0 / (1.0 + implicit->z * relaxation), rate);
 }
 
 /* Returns the force of the ground on a body at a contact that a stage's accelerations contain;

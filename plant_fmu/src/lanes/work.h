@@ -83,8 +83,8 @@ typedef union {
 /* Slopes of a row of contacts for all stages of a step. */
 typedef struct {
   hxReal stiffness, viscosity, drag;
-  hxReal bristle, yield; /* N/m, 1/s  bristle stiffness/(1 + z yield), release rate */
-  hxReal spin, roll;     /* N m s  of the moment; set with spin or rolling friction */
+  hxReal bristle, relaxation; /* N/m, 1/s  stiffness/(1 + z beta); beta */
+  hxReal spin, roll;          /* N m s  of the moment; set with spin or rolling friction */
 } hxContactSlope;
 
 /* Data of a stage of a linearly implicit method (eq. 19). The derivatives of contact and servo

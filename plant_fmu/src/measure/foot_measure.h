@@ -166,8 +166,8 @@ HX_RARE hxReal soil_within(const hxPath *path, int leg, const hxReal *depth, con
   hxReal numbers[HX_SOIL_SIZE];
   for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_splat(path->contact->soil[i][leg]);
   memcpy(&soil, numbers, sizeof soil);
-  return hx_soil_forces(&soil, hx_splat(path->contact->plastic[leg]), *depth, *rate / path->h,
-                        hx_virgin(&soil, *depth))
+  return hx_soil_normal_force(&soil, hx_splat(path->contact->plastic[leg]), *depth, *rate / path->h,
+                              hx_virgin_force(&soil, *depth))
       .force;
 }
 

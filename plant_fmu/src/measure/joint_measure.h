@@ -42,7 +42,7 @@ static inline hxReal measure_joint(const hxPath *path, int joint, int slot, hxRe
     hxReal torque = mean_torque; /* a kinematic drive has no torque law */
     if (model->servo_mode != HX_SERVO_KINEMATIC)
       torque =
-          hx_motor_torque(model, within_turn(q.value), speed, hx_load(&command->angle[joint][slot]),
+          hx_servo_torque(model, within_turn(q.value), speed, hx_load(&command->angle[joint][slot]),
                           hx_load(&command->speed[joint][slot]),
                           hx_load(&command->torque[joint][slot]), hx_power_of(command, joint, slot))
               .torque;

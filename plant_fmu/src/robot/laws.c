@@ -8,8 +8,7 @@
 #include "../ground/soil.h"
 #include "../ground/surface.h"
 
-static const double load_share =
-    0.01; /* 1  of the robot's weight; feet with a larger load count their slip */
+static const double load_share = 0.01; /* 1  of the weight; feet with more count their slip */
 
 double hx_weight(const hxDefinition *d) {
   double mass = d->torso.mass;

@@ -70,8 +70,8 @@ HX_API void hx_probe_soil(const hxSoilDefinition *definition, const double *row,
   for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_splat(((const double *)&soil)[i]);
   memcpy(&soils, numbers, sizeof soils);
   const hxReal p = hx_splat(plastic), at = hx_splat(z);
-  const hxSoilCurves virgin = hx_virgin(&soils, at);
-  const hxSoilForces f = hx_soil_forces(&soils, p, at, hx_splat(dz), virgin);
+  const hxSoilCurves virgin = hx_virgin_force(&soils, at);
+  const hxSoilForces f = hx_soil_normal_force(&soils, p, at, hx_splat(dz), virgin);
   const hxReal result[10] = {virgin.force,
                              virgin.slope,
                              hx_plastic_depth(&soils, at, virgin),
@@ -172,9 +172,10 @@ HX_API void hx_probe_sliding(const hxPlant *plant, const double slip[3], const d
   const hxReal drag = hx_friction_drag(model, at, hx_sqrt(hx_dot(v, v)));
   hxBristle f = {hx_scale(drag, v), hx_zero3(), zero, drag, zero};
   if (hx_friction_kind(model->friction_law).has_bristles)
-    f = hx_bristle_friction(model, at, one, z, v);
+    f = hx_friction_grip(model, at, one, z, v);
   put3(f.grip, 0, out), put3(f.rate, 0, out + 3);
-  out[6] = hx_lane(f.stiffness, 0), out[7] = hx_lane(f.damping, 0), out[8] = hx_lane(f.yield, 0);
+  out[6] = hx_lane(f.stiffness, 0), out[7] = hx_lane(f.damping, 0),
+  out[8] = hx_lane(f.relaxation, 0);
 }
 
 /* Moment of spin and rolling friction over load at an angular velocity. out: moment, its slopes
@@ -183,8 +184,8 @@ HX_API void hx_probe_turning(const hxPlant *plant, const double normal[3], const
                              double out[5]) {
   const hxFrictionAt at = {hx_splat(plant->model.mu), hx_splat(plant->model.static_rise)};
   const hxTurningFriction f =
-      hx_turning_friction(&plant->model, at, hx_splat(plant->model.radius[HX_FOOT]),
-                          hx_splat_vec3(normal), hx_splat_vec3(w));
+      hx_turning_moment(&plant->model, at, hx_splat(plant->model.radius[HX_FOOT]),
+                        hx_splat_vec3(normal), hx_splat_vec3(w));
   put3(f.moment, 0, out);
   out[3] = hx_lane(f.spin, 0), out[4] = hx_lane(f.roll, 0);
 }
@@ -214,7 +215,7 @@ HX_API void hx_probe_gear(const hxPlant *plant, double speed, double motor, doub
 HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
                            const double command[5], double out[4]) {
   const hxReal supply = hx_splat(command[3]);
-  const hxServo servo = hx_servo_torque(
+  const hxServo servo = hx_servo_slopes(
       &plant->model, hx_splat(angle), hx_splat(speed), hx_splat(command[0]), hx_splat(command[1]),
       hx_splat(command[2]), (hxPower){supply, supply, hx_splat(command[4])});
   out[0] = hx_lane(servo.torque, 0), out[1] = hx_lane(servo.friction, 0);
