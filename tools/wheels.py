@@ -165,8 +165,9 @@ def cross_compile() -> dict[tuple[str, str], bytes]:
 def loop_library() -> Library:
     """Returns the co-simulation loops as a library, as cosim/master/CMakeLists.txt builds it."""
     plant, loops = ROOT / "plant_fmu", [ROOT / "cosim/master", *ROOT.glob("extensions/*/loop")]
+    beside = ROOT.glob("extensions/*/*_fmu/include")  # of an extension's FMU, whose headers it uses
     files = {}
-    for include in (plant / "include", *(loop / "include" for loop in loops)):
+    for include in (plant / "include", *beside, *(loop / "include" for loop in loops)):
         files |= {path.relative_to(include).as_posix(): path for path in include.rglob("*.h")}
     for loop in loops:
         files |= {f"src/{path.name}": path for path in (loop / "src").glob("*.[ch]")}
