@@ -25,8 +25,7 @@ class Member:
 
     def moved(self, part: Inertial) -> Inertial:
         """Returns the link's mass, centre of mass and inertia in the body's frame."""
-        J_B = self.R_BL @ part.inertia @ self.R_BL.T
-        return Inertial(part.mass, self.point(part.com), J_B)
+        return Inertial(part.mass, self.point(part.com), self.R_BL @ part.inertia @ self.R_BL.T)
 
 
 @dataclass(frozen=True, eq=False)

@@ -122,20 +122,16 @@ def _leg(
     R_TC = R_BT.T @ R_BC
     R_TF = R_TC @ R_CF
     wanted = None if keep_frames else _pattern_yaw((R_TC, R_TF, R_TF @ R_FS), chain, outwards)
-    yaw, R_HC = _yaw(chain[0], R_TC, wanted, plain=bool((np.eye(3) == R_BT).all()))
+    yaw, R_HC = _yaw(chain[0], R_TC, wanted, plain=np.array_equal(R_BT, np.eye(3)))
     R_HF = R_HC @ R_CF
     R_HS = R_HF @ R_FS
     foot, radius = foot_of(chain[2].body)
-    tips = [
-        R_HC @ chain[1].position,
-        R_HF @ chain[2].position,
-        None if foot is None else R_HS @ foot,
-    ]
+    end = None if foot is None else R_HS @ foot
+    tips = (R_HC @ chain[1].position, R_HF @ chain[2].position, end)
     table: dict[str, Any] = {"hip_position": hip.tolist(), "hip_yaw": yaw}
     other_way = []
-    for joint, pattern, branch, R_HL, tip in zip(
-        JOINT_NAMES, PATTERN, chain, (R_HC, R_HF, R_HS), tips, strict=True
-    ):
+    links = zip(JOINT_NAMES, PATTERN, chain, (R_HC, R_HF, R_HS), tips, strict=True)
+    for joint, pattern, branch, R_HL, tip in links:
         axis, sign = _axis(R_HL @ branch.joint.axis, pattern if wanted is not None else None)
         other_way += [branch.joint.name] if sign < 0.0 else []
         table[joint] = _link(branch, R_HL, tip, axis, sign, where)

@@ -52,11 +52,6 @@ void hx_initial_bodies(const hxDefinition *d, double body[HX_BODIES][HX_BODY_STA
   }
 }
 
-/* Copies the rotation of the axes of a link's state in the link's. */
-static void frame_of(const hxModel *model, int leg, int joint, double q_Lj[4]) {
-  for (int i = 0; i < 4; ++i) q_Lj[i] = model->joint[joint].q_Lj[i][leg];
-}
-
 void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX_BODY_STATE],
                            hxPlantMotion *motion) {
   memcpy(motion->torso, body[0], sizeof motion->torso);
@@ -65,7 +60,7 @@ void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX
     for (int leg = 0; leg < HX_LEGS; ++leg) {
       const double *from = body[1 + HX_JOINTS * leg + joint], *q_WL = from + HX_P;
       double q_Lj[4], q_Wj[4];
-      frame_of(model, leg, joint, q_Lj);
+      for (int i = 0; i < 4; ++i) q_Lj[i] = model->joint[joint].q_Lj[i][leg];
       hx_quaternion_product(q_WL, q_Lj, q_Wj);
       for (int i = 0; i < HX_BODY_STATE; ++i) to[i][leg] = from[i];
       for (int i = 0; i < 4; ++i) to[HX_P + i][leg] = q_Wj[i];
@@ -82,7 +77,7 @@ void hx_bodies_from_motion(const hxModel *model, const hxPlantMotion *motion,
       double *to = body[1 + HX_JOINTS * leg + joint], *q_Wj = to + HX_P;
       double q_Lj[4], q_jL[4], q_WL[4];
       for (int i = 0; i < HX_BODY_STATE; ++i) to[i] = motion->link[joint][i][leg];
-      frame_of(model, leg, joint, q_Lj);
+      for (int i = 0; i < 4; ++i) q_Lj[i] = model->joint[joint].q_Lj[i][leg];
       hx_quaternion_conjugate(q_Lj, q_jL);
       hx_quaternion_product(q_Wj, q_jL, q_WL);
       memcpy(to + HX_P, q_WL, sizeof q_WL);
