@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.cli import main
         (["simulate", "walk_flt"], ["unknown scenario", "did you mean 'walk_flat'"]),
         (
             ["simulate", "--set", "gait.periode=1"],
-            ["walk_flat.toml", "'periode'", "did you mean 'period'"],
+            ["--set gait.periode: ", "did you mean 'period'"],
         ),
         (["simulate", "--set", "macro_step=-0.005"], ["macro_step", "got -0.005", "> 0"]),
         (["simulate", "--control", "complaint"], ["'complaint'", "did you mean 'compliant'"]),
