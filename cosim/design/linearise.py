@@ -84,8 +84,7 @@ class Motion:
 
     def less(self, other: Motion) -> Array:
         """Returns the small changes (48,) that lead from another motion to this one."""
-        w, x, y, z = other.values[3:7]
-        q_WT, q_TV = self.values[3:7], np.array([w, -x, -y, -z])
+        q_WT, q_TV = self.values[3:7], other.values[3:7] * np.array([1.0, -1.0, -1.0, -1.0])
         q_WV = quaternion_product(q_WT, q_TV)
         return np.concatenate(
             [
