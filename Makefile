@@ -74,7 +74,7 @@ help-extensions::
 
 -include $(wildcard extensions/*/targets.mk)
 
-setup: $(STAMP)
+setup: $(STAMP) typing
 
 # both are installed anew whenever the C sources or the project's description change
 $(STAMP): $(SOURCES) | $(VENV)/.python
@@ -101,7 +101,7 @@ $(VENV)/.python:
 demo: $(RUNTIME)
 	$(BIN)/hexapod compare demo_course -o out/demo
 
-test: setup typing
+test: setup
 	$(BIN)/python -m pytest $(PARALLEL)
 
 # builds the site with its notebooks run and its validation computed
@@ -218,7 +218,7 @@ lint-c-%: setup
 	@if command -v $* >/dev/null; then $(call CONFIGURE,lint-$*) && $(call BUILD,lint-$*); \
 	else echo "lint-c: skipped what $* warns about: no $* is installed (Debian, Ubuntu: apt-get install $*)"; fi
 
-check: setup typing lint-c
+check: setup lint-c
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
@@ -229,7 +229,7 @@ check: setup typing lint-c
 	$(BIN)/python tools/generate.py --check
 	$(BIN)/python tools/rooms.py --check
 
-bench: setup typing
+bench: setup
 	$(BIN)/python -m benchmarks.run
 
 bench-quick: setup

@@ -84,12 +84,9 @@ def simulate(
     check_type(settings, (Mapping, NoneType), "a dict of values by name", where="settings")
     check_type(label, (str, NoneType), "a name", where="label")
     check_type(fmu, (str, Path, NoneType), "the path of an FMU", where="fmu")
-    given = "gains or the path of their file"
-    check_type(gains, (str, Path, Gains, NoneType), given, where="gains")
     text = controller.text if isinstance(controller, Control) else controller
-    text = text if isinstance(text, str) else None
-    law = None if text is not None else controller
-    plan = _scenario(scenario, settings or {}, text)
+    law = None if isinstance(text, str) else controller
+    plan = _scenario(scenario, settings or {}, text if law is None else None)
     if label is not None and law is None:
         plain = plan.control.rpartition("=")[2]
         plan = replace(plan, control=parse_control(f"{label}={plain}", where="label").text)

@@ -46,9 +46,9 @@ def joint_kinematics(joint: JointModel, parent: Array, child: Array) -> JointKin
     The first row of gamma contains the time derivatives that the paper's print lacks.
     """
     (r_i, p_i, v_i, w_i), (r_j, p_j, v_j, w_j) = split(parent), split(child)
-    R_i, R_j = rotation_matrix(p_i), rotation_matrix(p_j)
-    sP_i, sP_j, s = R_i @ joint.point_i, R_j @ joint.point_j, R_i @ joint.s_i
-    a, b = R_j @ joint.a_j, R_j @ joint.b_j
+    R_Wi, R_Wj = rotation_matrix(p_i), rotation_matrix(p_j)
+    sP_i, sP_j, s = R_Wi @ joint.point_i, R_Wj @ joint.point_j, R_Wi @ joint.s_i
+    a, b = R_Wj @ joint.a_j, R_Wj @ joint.b_j
 
     # Phi = (r_j + s_j^P - r_i - s_i^P,  a.s,  b.s)
     phi = np.concatenate([r_j + sP_j - r_i - sP_i, [a @ s, b @ s]])
@@ -107,18 +107,18 @@ def constraint_errors(robot: Robot, body: Array) -> tuple[float, float]:
 def project(robot: Robot, body: Array) -> Array:
     """Returns the bodies (19, 13), projected onto their joints from hip to foot.
 
-    The smallest rotation aligns the axis, a translation restores the joint's point, and velocities
-    keep only the rotation about the axis.
+    The smallest rotation q_WV aligns the axis, a translation restores the joint's point, and
+    velocities keep only the rotation about the axis.
     """
     body = body.copy()
     for joint in joint_models(robot):
         parent, child = body[joint.parent], body[joint.child]
-        R_i = rotation_matrix(parent[3:7])
-        s, z = R_i @ joint.s_i, rotation_matrix(child[3:7]) @ joint.s_j
-        turn = np.concatenate([[1.0 + z @ s], cross(z, s)])
-        child[3:7] = quaternion_product(turn / np.linalg.norm(turn), child[3:7])
+        R_Wi, q_Vj = rotation_matrix(parent[3:7]), child[3:7]
+        s, z = R_Wi @ joint.s_i, rotation_matrix(q_Vj) @ joint.s_j
+        q_WV = np.concatenate([[1.0 + z @ s], cross(z, s)])
+        child[3:7] = quaternion_product(q_WV / np.linalg.norm(q_WV), q_Vj)
         child[10:13] = parent[10:13] + (s @ (child[10:13] - parent[10:13])) * s
-        sP_i, sP_j = R_i @ joint.point_i, rotation_matrix(child[3:7]) @ joint.point_j
+        sP_i, sP_j = R_Wi @ joint.point_i, rotation_matrix(child[3:7]) @ joint.point_j
         child[0:3] = parent[0:3] + sP_i - sP_j
         child[7:10] = parent[7:10] + cross(parent[10:13], sP_i) - cross(child[10:13], sP_j)
     return body

@@ -49,9 +49,9 @@ def start_unknowns(robot: Robot) -> Array:
 
 def attitude(x: Array) -> Array:
     """Returns the torso's quaternion (4,) of the unknowns."""
-    roll = axis_quaternion(np.array([1.0, 0.0, 0.0]), x[1])
-    pitch = axis_quaternion(np.array([0.0, 1.0, 0.0]), x[2])
-    return quaternion_product(pitch, roll)
+    q_VT = axis_quaternion(np.array([1.0, 0.0, 0.0]), x[1])  # roll
+    q_WV = axis_quaternion(np.array([0.0, 1.0, 0.0]), x[2])  # pitch
+    return quaternion_product(q_WV, q_VT)
 
 
 def creep_velocity(robot: Robot, x: Array) -> Array:
@@ -137,10 +137,10 @@ def _carry_to_torso(robot: Robot, body: Array, force: Array, moment: Array) -> t
     on_torso, torque = np.zeros((LEGS, TORSO)), np.zeros(LEGS * JOINTS)
     for k, joint in reversed(list(enumerate(joint_models(robot)))):
         i, j = joint.parent, joint.child
-        R_i = rotation_matrix(body[i, 3:7])
-        sP_i = R_i @ joint.point_i
+        R_Wi = rotation_matrix(body[i, 3:7])
+        sP_i = R_Wi @ joint.point_i
         at_joint = moment[j] + cross(body[j, 0:3] - (body[i, 0:3] + sP_i), force[j])
-        torque[k] = at_joint @ (R_i @ joint.s_i)
+        torque[k] = at_joint @ (R_Wi @ joint.s_i)
         carried = at_joint + cross(sP_i, force[j])
         if i == 0:
             on_torso[k // JOINTS] = np.concatenate([force[j], carried])

@@ -119,7 +119,9 @@ class FmuError(HexapodError):
     """An FMU is missing, invalid or damaged, or a call of it failed."""
 
 
-LEAST_SIMILARITY = 0.5  # of difflib, in [0, 1]
+LEAST_SIMILARITY = 0.65  # of difflib, in [0, 1]; "trot" and "tripod" have 0.6
+LEAST_OF_SHORT = 0.5  # of names of at most SHORT characters, such as "my" for "mu"
+SHORT = 3
 # up to this similarity, names with different first letters share letters by chance: "foo", "robot"
 CHANCE = 0.52
 LEAST_BEGINNING = 3  # characters of a name's beginning that say which name is meant
@@ -134,7 +136,8 @@ def nearest_name(name: str, valid: Iterable[str]) -> str | None:
     longer = [one for one in names if one.startswith(name)]
     if longer and len(name) >= LEAST_BEGINNING:
         return longer[0]
-    for match in get_close_matches(name, names, cutoff=LEAST_SIMILARITY):
+    least = LEAST_OF_SHORT if len(name) <= SHORT else LEAST_SIMILARITY
+    for match in get_close_matches(name, names, cutoff=least):
         if match[:1] == name[:1] or SequenceMatcher(None, match, name).ratio() > CHANCE:
             return match
     return None

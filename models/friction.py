@@ -78,18 +78,14 @@ def sliding_grip(friction: Friction, normal: float, slip: Array, bristle: Array)
     return Grip(-normal * drag * slip, drag)
 
 
-def stribeck_curve(friction: Friction, sliding: Array) -> Array:
+def stribeck_curve(friction: Friction, sliding: Array | float) -> Array:
     """Returns mu(p) = mu + (mu_s - mu)/(1 + (p/v_s)^2) for sliding at p [m/s] (eq. 18).
 
     The shape is that of p.
     """
     above = max(friction.mu_static - friction.mu, 0.0)
-    return np.asarray(friction.mu + above / (1.0 + (sliding / friction.stribeck_speed) ** 2))
-
-
-def sliding_friction(friction: Friction, sliding: float) -> float:
-    """Returns mu(p) of `stribeck_curve` for one speed [m/s]."""
-    return float(stribeck_curve(friction, np.array(sliding)))
+    x = np.asarray(sliding) / friction.stribeck_speed
+    return np.asarray(friction.mu + above / (1.0 + x**2))
 
 
 def no_friction(friction: Friction, speed: float) -> float:
@@ -117,7 +113,7 @@ def friction_drag(friction: Friction, speed: float) -> float:
     if not law.has_friction:
         return 0.0
     along = law.direction(friction, speed)
-    return sliding_friction(friction, speed) * along + friction.viscous
+    return float(stribeck_curve(friction, speed)) * along + friction.viscous
 
 
 # bristles
@@ -154,7 +150,7 @@ def bristle_friction(friction: Friction, normal: float, slip: Array, bristle: Ar
     at any slip velocity.
     """
     plastic = bristle_sliding(friction, slip, bristle)
-    mu = sliding_friction(friction, float(np.linalg.norm(plastic)))
+    mu = float(stribeck_curve(friction, float(np.linalg.norm(plastic))))
     per_rate = 1.5 * friction.bristle_damping / friction.presliding
     u, d = bristle / friction.presliding, per_rate * (slip - plastic)
     size, push = float(np.linalg.norm(u)), float(np.linalg.norm(d))
@@ -208,7 +204,7 @@ def lugre_friction(friction: Friction, normal: float, slip: Array, bristle: Arra
     stiffness = rest_friction(friction) / friction.presliding
     still = stiffness * friction.bristle_damping
     speed = float(np.linalg.norm(slip))
-    sigma = still / (1.0 + still * speed / (sliding_friction(friction, speed) + NO_FRICTION))
+    sigma = still / (1.0 + still * speed / (float(stribeck_curve(friction, speed)) + NO_FRICTION))
     rate = slip - lugre_sliding(friction, slip, bristle)
     force = -normal * (stiffness * bristle + sigma * rate + friction.viscous * slip)
     relaxation = float(lugre_relaxation(friction, np.array(speed)))

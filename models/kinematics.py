@@ -100,7 +100,7 @@ class JointModel:
     b_j: Array
     point_i: Array  # centre of mass of i to the joint's point [m]
     point_j: Array  # centre of mass of j to the joint's point [m]
-    zero: Array  # (4,) rotation from the parent's to the child's axes at angle 0
+    q_i0: Array  # (4,) from 0, the child's axes at angle 0, to the parent's
 
 
 def axis_normals(axis: Array) -> tuple[Array, Array]:
@@ -132,7 +132,7 @@ def _joint_models(torso: Torso, legs: tuple[Leg, ...]) -> tuple[JointModel, ...]
 def _joint_model(torso: Torso, data: Leg, leg: int, joint: int) -> JointModel:
     child = 1 + JOINTS * leg + joint
     link, axis = data.links[joint], unit_axis(data.links[joint].axis)
-    zero = axis_quaternion(np.array([0.0, 0.0, 1.0]), data.hip_yaw if joint == 0 else 0.0)
+    q_i0 = axis_quaternion(np.array([0.0, 0.0, 1.0]), data.hip_yaw if joint == 0 else 0.0)
     above = data.links[joint - 1]
     from_com = (
         np.subtract(data.hip_position, torso.com)
@@ -143,13 +143,13 @@ def _joint_model(torso: Torso, data: Leg, leg: int, joint: int) -> JointModel:
     return JointModel(
         parent=0 if joint == 0 else child - 1,
         child=child,
-        s_i=rotation_matrix(zero) @ axis,
+        s_i=rotation_matrix(q_i0) @ axis,
         s_j=axis,
         a_j=a_j,
         b_j=b_j,
         point_i=from_com,
         point_j=-np.array(link.com),
-        zero=zero,
+        q_i0=q_i0,
     )
 
 
@@ -158,9 +158,10 @@ def foot_position(leg: Leg, angle: Array) -> Array:
     [rad].
     """
     p_T = np.array(leg.hip_position)
-    R_TL = axis_rotation(np.array([0.0, 0.0, 1.0]), leg.hip_yaw)
+    R_TP = axis_rotation(np.array([0.0, 0.0, 1.0]), leg.hip_yaw)
     for link, q in zip(leg.links, angle, strict=True):
-        R_TL = R_TL @ axis_rotation(unit_axis(link.axis), q)
+        R_PL = axis_rotation(unit_axis(link.axis), q)
+        R_TP = R_TL = R_TP @ R_PL  # the link is the next one's parent
         p_T = p_T + R_TL @ np.array(link.tip)
     return p_T
 
@@ -201,13 +202,14 @@ def body_states(
 
 def _child_state(joint: JointModel, parent: Array, q: float, qd: float) -> Array:
     """Returns the child's state (13,) at a joint angle [rad] and speed [rad/s]."""
-    r_i, p_i, v_i, w_i = split(parent)
-    p_j = quaternion_product(quaternion_product(p_i, joint.zero), axis_quaternion(joint.s_j, q))
-    R_i = rotation_matrix(p_i)
-    sP_i, sP_j = R_i @ joint.point_i, rotation_matrix(p_j) @ joint.point_j
-    w_j = w_i + qd * (R_i @ joint.s_i)
+    r_i, q_Wi, v_i, w_i = split(parent)
+    q_W0, q_0j = quaternion_product(q_Wi, joint.q_i0), axis_quaternion(joint.s_j, q)
+    q_Wj = quaternion_product(q_W0, q_0j)
+    R_Wi, R_Wj = rotation_matrix(q_Wi), rotation_matrix(q_Wj)
+    sP_i, sP_j = R_Wi @ joint.point_i, R_Wj @ joint.point_j
+    w_j = w_i + qd * (R_Wi @ joint.s_i)
     v_j = v_i + cross(w_i, sP_i) - cross(w_j, sP_j)
-    return np.concatenate([r_i + sP_i - sP_j, p_j, v_j, w_j])
+    return np.concatenate([r_i + sP_i - sP_j, q_Wj, v_j, w_j])
 
 
 def split(state: Array) -> tuple[Array, Array, Array, Array]:
@@ -221,9 +223,10 @@ def joint_angle(joint: JointModel, parent: Array, child: Array) -> float:
     It is the twist about the axis, so that small violations of the joint do not enter to first
     order.
     """
-    p_i = quaternion_product(parent[3:7], joint.zero)
-    p = quaternion_product(p_i * np.array([1.0, -1.0, -1.0, -1.0]), child[3:7])
-    angle = 2.0 * np.arctan2(joint.s_j @ p[1:], p[0])
+    q_Wi, q_Wj = parent[3:7], child[3:7]
+    q_0W = quaternion_product(q_Wi, joint.q_i0) * np.array([1.0, -1.0, -1.0, -1.0])
+    q_0j = quaternion_product(q_0W, q_Wj)
+    angle = 2.0 * np.arctan2(joint.s_j @ q_0j[1:], q_0j[0])
     return float(angle - 2.0 * np.pi * np.ceil((angle - np.pi) / (2.0 * np.pi)))
 
 
@@ -255,7 +258,7 @@ def foot_centres(robot: Robot, body: Array) -> Array:
     points = [np.array(leg.links[-1].tip) - np.array(leg.links[-1].com) for leg in robot.legs]
     return np.array(
         [
-            state[0:3] + rotation_matrix(state[3:7]) @ point_foot
-            for state, point_foot in zip(tibias, points, strict=True)
+            state[0:3] + rotation_matrix(state[3:7]) @ p_S
+            for state, p_S in zip(tibias, points, strict=True)
         ]
     )

@@ -268,23 +268,23 @@ def _servos(root: ET.Element, robot: Robot) -> None:
 
 def _stance(root: ET.Element, robot: Robot) -> None:
     """Adds the standing pose: the lowest feet touch the ground, the torso is parallel to it."""
-    tilt = _ground_quaternion(robot)
+    q_WG = _ground_quaternion(robot)
     heading = robot.terrain.heading if robot.terrain.kind == "slope" else 0.0
-    quaternion = quaternion_product(tilt, axis_quaternion(Z, -heading))
+    q_GT = axis_quaternion(Z, -heading)
+    q_WT = quaternion_product(q_WG, q_GT)
     feet = foot_positions(robot, robot.stance)
     height = robot.foot.radius - float(np.min(feet[:, 2]))  # of the torso's frame above the plane
-    place = np.array([0.0, 0.0, robot.terrain.height]) + height * rotation_matrix(tilt)[:, 2]
+    place = np.array([0.0, 0.0, robot.terrain.height]) + height * rotation_matrix(q_WG)[:, 2]
     key = add(add(root, "keyframe"), "key", name="stance")
     angles = robot.joints.signs * robot.stance.ravel()
-    key.set("qpos", joined([*place, *quaternion, *angles]))
+    key.set("qpos", joined([*place, *q_WT, *angles]))
     key.set("ctrl", joined(angles))
 
 
 def _ground_quaternion(robot: Robot) -> Array:
-    """Returns the rotation (4,) of z to the ground's normal."""
+    """Returns q_WG (4,) of the ground: its z is the normal, its x goes uphill."""
     terrain = robot.terrain
     slope = terrain.kind == "slope"
-    turn = axis_quaternion(Z, terrain.heading if slope else 0.0)
-    return quaternion_product(
-        turn, axis_quaternion(np.array([0.0, 1.0, 0.0]), -terrain.incline if slope else 0.0)
-    )
+    q_WV = axis_quaternion(Z, terrain.heading if slope else 0.0)
+    q_VG = axis_quaternion(np.array([0.0, 1.0, 0.0]), -terrain.incline if slope else 0.0)
+    return quaternion_product(q_WV, q_VG)

@@ -145,12 +145,12 @@ def error_norm(robot: Robot, estimate: Array) -> float:
 
     The estimate has the parts of `try_step` without the rotations (265,).
 
-    Quaternions of links are those of their joints' axes a, b, s, as in the C plant.
+    Quaternions of links are those of their joints' axes a, b, s (A), as in the C plant.
     """
     body = estimate[:BODY].reshape(BODIES, BODY_STATE).copy()
     for joint in joint_models(robot):
-        turn = frame_quaternion(joint.a_j, joint.b_j, joint.s_j)
-        body[joint.child, 3:7] = quaternion_product(body[joint.child, 3:7], turn)
+        q_Wj, q_jA = body[joint.child, 3:7], frame_quaternion(joint.a_j, joint.b_j, joint.s_j)
+        body[joint.child, 3:7] = quaternion_product(q_Wj, q_jA)
     largest = float(np.max(np.abs(body) / ERROR_SCALE))
     length = bristle_length(robot)
     if length > 0.0:

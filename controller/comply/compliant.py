@@ -44,8 +44,8 @@ STEERING_TIME = 0.1  # s    duration of the ramp from one added velocity to the 
 def sense(measurement: Measurement, posture: Posture) -> Array:
     """Returns the foot forces (6, 3) in the walking frame [N]: f_K = R_KT R_TW f_W (C22)."""
     R_WT = unit_rotation(*measurement.quaternion.tolist())
-    force = measurement.foot_force @ R_WT
-    return force if posture.level else np.asarray(force @ posture.R_KT.T)
+    f_T = measurement.foot_force @ R_WT  # rows
+    return f_T if posture.level else np.asarray(f_T @ posture.R_KT.T)
 
 
 class PresentStep(NamedTuple):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
 from collections.abc import Mapping
 from typing import Any
@@ -27,6 +28,7 @@ RUN_EPILOG = (
     "comparison: what was recorded and measured is written all the same, and a comparison is of "
     "the seeds on which both walked."
 )
+NO_COMMAND = re.compile("No such command '(.*?)'")  # what the parser says of one
 OF_ERRORS = ("what", "got", "expected", "fix", "where")  # attributes of a HexapodError
 
 # option that people expect -> setting that does what it would do
@@ -92,6 +94,13 @@ def usage_parts(error: Any) -> tuple[str, str, str]:
     if not context:
         return message, "a value after it", "`hexapod --help` explains it"
     path, fix = context.command_path, f"`{context.command_path} --help` explains it"
+    unknown = NO_COMMAND.match(message)
+    if unknown:
+        from hexapod_cosim.models.errors import suggestion
+
+        names = context.command.list_commands(context)
+        fix = suggestion(unknown[1], names, otherwise=fix)
+        return unknown[1], f"one of {', '.join(names)}", fix
     usage = " ".join([path, *context.command.collect_usage_pieces(context)])
     setting = SETTINGS.get(getattr(error, "option_name", "").replace("_", "-"))
     helps = " ".join(getattr(one, "help", None) or "" for one in context.command.params)

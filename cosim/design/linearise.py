@@ -77,18 +77,19 @@ class Motion:
         """Returns the motion after small changes (48,)."""
         new = self.values.copy()
         new[:3] += state[:3]
-        new[3:7] = quaternion_product(np.array([1.0, *(0.5 * state[3:6])]), self.values[3:7])
+        q_WV, q_VT = np.array([1.0, *(0.5 * state[3:6])]), self.values[3:7]
+        new[3:7] = quaternion_product(q_WV, q_VT)
         new[7:] += state[6:]
         return Motion(values=new)
 
     def less(self, other: Motion) -> Array:
         """Returns the small changes (48,) that lead from another motion to this one."""
-        w, x, y, z = other.values[3:7]
-        turn = quaternion_product(self.values[3:7], np.array([w, -x, -y, -z]))
+        q_WT, q_TV = self.values[3:7], other.values[3:7] * np.array([1.0, -1.0, -1.0, -1.0])
+        q_WV = quaternion_product(q_WT, q_TV)
         return np.concatenate(
             [
                 self.values[:3] - other.values[:3],
-                2.0 * turn[1:] / turn[0],
+                2.0 * q_WV[1:] / q_WV[0],
                 self.values[7:] - other.values[7:],
             ]
         )

@@ -86,8 +86,8 @@ def draw_robot(robot: Robot, *, width: int, height: int) -> bytes:
 
     Width and height are in pixels. Raises RobotError when the robot cannot stand.
     """
-    camera = _camera_axes()
-    shapes = _robot_shapes(robot, *settled(robot), camera)
+    R_EW = _camera_axes()
+    shapes = _robot_shapes(robot, *settled(robot), R_EW)
     corners = np.concatenate(
         [shape.points[:, :2] + reach for shape in shapes for reach in (-shape.radius, shape.radius)]
     )
@@ -117,7 +117,7 @@ def _draw(pen: ImageDraw.ImageDraw, shape: Shape, origin: Array, scale: float) -
 
 
 def _camera_axes() -> Array:
-    """Returns the camera axes (rows) in world axes."""
+    """Returns R_EW (3, 3), whose rows are the axes of the camera E in world axes."""
     toward = np.array(
         [
             math.cos(ELEVATION) * math.cos(AZIMUTH),
@@ -130,7 +130,7 @@ def _camera_axes() -> Array:
 
 
 def _robot_shapes(
-    robot: Robot, position: Array, quaternion: Array, angle: Array, camera: Array
+    robot: Robot, position: Array, quaternion: Array, angle: Array, R_EW: Array
 ) -> list[Shape]:
     """Returns links and the torso's visible faces, the farthest first.
 
@@ -140,36 +140,36 @@ def _robot_shapes(
     bodies = body_states(
         robot, position, quaternion, np.zeros(3), np.zeros(3), angle, np.zeros_like(angle)
     )
-    turn = rotation_matrix(bodies[0, 3:7])
-    middle = position - turn @ np.array(robot.torso.com)
-    parts = [(float((camera @ middle)[2]), _faces(robot, middle, turn, camera))]
+    R_WT = rotation_matrix(bodies[0, 3:7])
+    middle = position - R_WT @ np.array(robot.torso.com)
+    parts = [(float((R_EW @ middle)[2]), _faces(robot, middle, R_WT, R_EW))]
     for number, body in enumerate(bodies[1:]):
-        shape = _link(robot, number // 3, number % 3, body, camera)
+        shape = _link(robot, number // 3, number % 3, body, R_EW)
         parts.append((float(shape.points[:, 2].mean()), [shape]))
     return [shape for _, shapes in sorted(parts, key=lambda part: part[0]) for shape in shapes]
 
 
-def _link(robot: Robot, leg: int, joint: int, body: Array, camera: Array) -> Shape:
+def _link(robot: Robot, leg: int, joint: int, body: Array, R_EW: Array) -> Shape:
     """Returns the line from a link's joint to its tip."""
-    link, turn = robot.legs[leg].links[joint], rotation_matrix(body[3:7])
-    start = body[:3] - turn @ np.array(link.com)
-    along = turn @ np.array(link.tip)
+    link, R_WL = robot.legs[leg].links[joint], rotation_matrix(body[3:7])
+    start = body[:3] - R_WL @ np.array(link.com)
+    along = R_WL @ np.array(link.tip)
     slope = float(along @ LIGHT) / (float(np.linalg.norm(along)) or 1.0)
     colour = _lit(COLOURS[("coxa", "femur", "tibia")[joint]], math.sqrt(max(1.0 - slope**2, 0.0)))
     radius = THICKNESS[joint] * robot.legs[leg].links[0].length
-    return Shape(np.array([start, start + along]) @ camera.T, colour, radius)
+    return Shape(np.array([start, start + along]) @ R_EW.T, colour, radius)
 
 
-def _faces(robot: Robot, middle: Array, turn: Array, camera: Array) -> list[Shape]:
+def _faces(robot: Robot, middle: Array, R_WT: Array, R_EW: Array) -> list[Shape]:
     """Returns the faces of the torso that the eye sees."""
-    found, half = [], 0.5 * turn * np.array(robot.torso.size)  # half of the edges as columns
+    found, half = [], 0.5 * R_WT * np.array(robot.torso.size)  # half of the edges as columns
     for axis in range(3):
-        side = 1.0 if camera[2] @ turn[:, axis] > 0.0 else -1.0
+        side = 1.0 if R_EW[2] @ R_WT[:, axis] > 0.0 else -1.0
         first, second = half[:, axis - 2], half[:, axis - 1]
         corners = [-first - second, first - second, first + second, second - first]
         points = middle + side * half[:, axis] + np.array(corners)
-        colour = _lit(COLOURS["torso"], side * float(turn[:, axis] @ LIGHT))
-        found.append(Shape(points @ camera.T, colour))
+        colour = _lit(COLOURS["torso"], side * float(R_WT[:, axis] @ LIGHT))
+        found.append(Shape(points @ R_EW.T, colour))
     return found
 
 

@@ -217,11 +217,11 @@ def _pose_readings(message: Any, com: Array) -> list[Reading]:
     for one in message.transforms:
         if one.child_frame_id in ros.TORSO_FRAMES and one.header.frame_id in ros.WORLD_FRAMES:
             place, turn = one.transform.translation, one.transform.rotation
-            quaternion = np.array([turn.w, turn.x, turn.y, turn.z])
+            q_WT = np.array([turn.w, turn.x, turn.y, turn.z])
             position = np.array([place.x, place.y, place.z])
             if com.any():
-                position = position + rotation_matrix(quaternion) @ com
-            found.append((names, _stamp(one.header), [*position.tolist(), *quaternion.tolist()]))
+                position = position + rotation_matrix(q_WT) @ com
+            found.append((names, _stamp(one.header), [*position.tolist(), *q_WT.tolist()]))
     return found
 
 

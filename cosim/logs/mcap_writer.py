@@ -216,4 +216,4 @@ def _torso_places(recording: Recording, com: Array) -> Array:
     if not com.any():
         return positions
     turns = recording.columns(vector_names("torso.quaternion", 4))
-    return np.asarray(positions - np.array([rotation_matrix(turn) @ com for turn in turns]))
+    return np.asarray(positions - np.array([rotation_matrix(q_WT) @ com for q_WT in turns]))

@@ -107,10 +107,8 @@ def centre_of_mass(recording: Recording, parameters: Mapping[str, float]) -> Arr
         own, first = moment_of_leg(leg, angle[:, k], parameters)
         mass, moment = mass + own, moment + first
     offset = moment / mass - com  # from the torso's centre of mass
-    rotation = rotation_matrices(recording.vector("torso.quaternion", 4))
-    return np.asarray(
-        recording.vector("torso.position") + np.einsum("ijr,rj->ri", rotation, offset)
-    )
+    R_WT = rotation_matrices(recording.vector("torso.quaternion", 4))
+    return np.asarray(recording.vector("torso.position") + np.einsum("ijr,rj->ri", R_WT, offset))
 
 
 def rotation_matrices(quaternion: Array) -> Array:
@@ -229,7 +227,7 @@ def real_feet(recording: Recording, parameters: Mapping[str, float]) -> Array:
     """
     if parameters.get("terrain.kind", FLAT) == GRID:
         return feet_of_angles(recording, parameters)
-    turn = rotation_matrices(recording.vector("torso.quaternion", 4))
+    R_WT = rotation_matrices(recording.vector("torso.quaternion", 4))
     centres = recording.foot_vectors("position") + parameters["foot.radius"] * ground_normal(
         parameters
     )
@@ -237,7 +235,7 @@ def real_feet(recording: Recording, parameters: Mapping[str, float]) -> Array:
     com = np.array([parameters[name] for name in vector_names("torso.com")])
     along = arms.transpose(2, 1, 0)  # (3, 6, rows)
     seen = [
-        turn[0, i] * along[0] + turn[1, i] * along[1] + turn[2, i] * along[2] + com[i]
+        R_WT[0, i] * along[0] + R_WT[1, i] * along[1] + R_WT[2, i] * along[2] + com[i]
         for i in range(3)
     ]
     return np.array(seen).transpose(2, 1, 0)

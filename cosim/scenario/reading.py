@@ -67,7 +67,14 @@ def load_scenario(path_or_name: str | Path, *, overrides: Sequence[str] = ()) ->
     """
     given = read_overrides(overrides)
     table, where = read_tables(path_or_name)
-    return scenario_from_table(with_values(table, given), where=where, given=given)
+    try:
+        return scenario_from_table(with_values(table, given), where=where, given=given)
+    except ScenarioError as error:
+        key = (error.where or "").removeprefix(f"{where}: ")
+        for name in (key, f"{key}.{error.got}"):  # of a value, of an unknown key
+            if name in given:
+                error.where = f"--set {name}"
+        raise
 
 
 def scenario_from_table(

@@ -76,13 +76,13 @@ def initial_values(robot: Robot, parameters: Mapping[str, float], drawn: Drawn) 
     position, quaternion, angle = (
         np.array([parameters[name] for name in names]) for names in (POSITION, QUATERNION, ANGLE)
     )
-    half_turn = np.array([1.0, *(0.5 * drawn.rotation)])
-    turned = quaternion_product(half_turn / np.linalg.norm(half_turn), quaternion)
+    q_WV, q_VT = np.array([1.0, *(0.5 * drawn.rotation)]), quaternion
+    q_WT = quaternion_product(q_WV / np.linalg.norm(q_WV), q_VT)
     bent = angle + drawn.angle.ravel()
     before = _depths_cached(robot, tuple(position), tuple(quaternion), tuple(angle))
-    deeper = _depths(robot, position, turned, bent) - before
+    deeper = _depths(robot, position, q_WT, bent) - before
     raised = position + np.array([0.0, 0.0, max(float(deeper.max()), 0.0) + drawn.height])
-    pairs = ((POSITION, raised), (QUATERNION, turned), (ANGLE, bent))
+    pairs = ((POSITION, raised), (QUATERNION, q_WT), (ANGLE, bent))
     return {
         name: value
         for names, values in pairs
@@ -100,5 +100,6 @@ def _depths_cached(robot: Robot, *pose: tuple[float, ...]) -> Array:
 def _depths(robot: Robot, position: Array, quaternion: Array, angle: Array) -> Array:
     """Returns the penetration of the feet [m] (6,), negative above the ground."""
     feet = foot_positions(robot, angle.reshape(LEGS, JOINTS)) - np.array(robot.torso.com)
-    centres = position + feet @ rotation_matrix(quaternion / np.linalg.norm(quaternion)).T
+    R_WT = rotation_matrix(quaternion / np.linalg.norm(quaternion))
+    centres = position + feet @ R_WT.T
     return np.array([robot.foot.radius - ground(robot.terrain, centre)[0] for centre in centres])

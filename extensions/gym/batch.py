@@ -119,8 +119,7 @@ class Batch(Closing):
         robots = grounds(self.settings)
         self.robot = robots[0]
         with TemporaryFolder("gym") as folder:
-            given = surfaces(robots)
-            path = export_fmu(robots[0], folder / "plant.fmu", terrains=given, bare=True)
+            path = export_fmu(robots[0], folder / "plant.fmu", terrains=surfaces(robots), bare=True)
             plant = self._owned.plant = Fmu(path)
         self._allocate()
         native = self._native_settings(robots, plant)
@@ -161,11 +160,10 @@ class Batch(Closing):
     def _fmu(self, fmu: Fmu) -> Any:
         """Returns the functions of an FMU and what its instances are made with."""
         calls: dict[str, Any] = {name: fmu.address(call) for name, call in CALLS.items()}
-        calls["step"] = step_functions(fmu, None)
         resources = fmu.resources.resolve().as_uri().encode()
         texts = {"guid": fmu.description.guid.encode(), "resources": resources}
         self._kept.append(texts)
-        return NativeFmu(**calls, **texts)
+        return NativeFmu(**calls, step=step_functions(fmu, None), **texts)
 
     def _native_settings(self, robots: Sequence[Robot], plant: Fmu) -> Any:
         """Returns the settings as C reads them."""

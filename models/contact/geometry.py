@@ -16,7 +16,7 @@ import numpy as np
 
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.law import Contact, contact_damping, normal_force
-from hexapod_cosim.models.friction import LAWS, Friction, friction_force, sliding_friction
+from hexapod_cosim.models.friction import LAWS, Friction, friction_force, stribeck_curve
 from hexapod_cosim.models.ground.faces import Face, ground_faces
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, foot_centres, skew
 from hexapod_cosim.models.records import Robot
@@ -103,7 +103,7 @@ def turning_slopes(
     return (
         friction.spin_radius
         * radius
-        * sliding_friction(friction, slow)
+        * float(stribeck_curve(friction, slow))
         * direction(friction, slow),
         friction.rolling_radius * radius * direction(friction, fast),
     )

@@ -136,10 +136,8 @@ def friction_budget(servo: Servo, speed: Array, motor: Array, external: Array) -
         - servo.stribeck_external_load_friction * external
     )
     quadratic = quadratic_friction(servo, motor, external)
-    share = stribeck_share(servo, speed)
-    return np.asarray(
-        servo.coulomb_friction + load + share * (servo.stribeck_friction + sticking + quadratic)
-    )
+    slow = stribeck_share(servo, speed) * (servo.stribeck_friction + sticking + quadratic)
+    return np.asarray(servo.coulomb_friction + load + slow)
 
 
 def measured_friction(servo: Servo, speed: Array, motor: Array, external: Array) -> Array:

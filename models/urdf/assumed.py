@@ -90,10 +90,11 @@ def _height(table: Table) -> float:
 
 def _drop(leg: Table) -> float:
     """Returns how far a foot is below its hip in the standing pose [m]."""
-    R_HL, z = np.eye(3), 0.0
+    R_HP, z = np.eye(3), 0.0
     for joint in JOINT_NAMES:
         link = leg[joint]
-        R_HL = R_HL @ axis_rotation(np.array(link["axis"]), link["stance"])
+        R_PL = axis_rotation(np.array(link["axis"]), link["stance"])
+        R_HP = R_HL = R_HP @ R_PL  # the link is the next one's parent
         z -= float(R_HL[2] @ [link["length"], link.get("offset_y", 0.0), link.get("offset_z", 0.0)])
     return max(z, 1e-3)
 

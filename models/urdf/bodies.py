@@ -16,17 +16,16 @@ class Member:
     """A link of a body."""
 
     link: UrdfLink
-    rotation: Array  # (3, 3) link to body
+    R_BL: Array  # (3, 3) link to body
     position: Array  # (3,) m    of the link's frame in the body's
 
     def point(self, place: Array) -> Array:
         """Returns a point (3,) of the link in the body's frame [m]."""
-        return self.position + self.rotation @ place
+        return self.position + self.R_BL @ place
 
     def moved(self, part: Inertial) -> Inertial:
         """Returns the link's mass, centre of mass and inertia in the body's frame."""
-        R_BL = self.rotation
-        return Inertial(part.mass, self.point(part.com), R_BL @ part.inertia @ R_BL.T)
+        return Inertial(part.mass, self.point(part.com), self.R_BL @ part.inertia @ self.R_BL.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +33,7 @@ class Branch:
     """A moving joint and the body that it moves."""
 
     joint: UrdfJoint
-    rotation: Array  # (3, 3) child body to this one at angle 0
+    R_BL: Array  # (3, 3) child body's frame, that of its first link, to this one's at angle 0
     position: Array  # (3,) m
     direct: bool  # the joint leaves the body's own link, not one that is fixed to it
     body: Body
@@ -145,7 +144,8 @@ def _collect(body: Body, urdf: Urdf, leaving: dict[str, list[UrdfJoint]]) -> Non
             if joint.kind == "floating":
                 what, fix = "a link that floats", "only the torso may float: make it fixed"
                 raise RobotError(what, got=joint.child, expected="joints", fix=fix, where=where)
-            R_BL, p_B = member.rotation @ joint.rotation, member.point(joint.position)
+            R_BP, p_B = member.R_BL, member.point(joint.position)
+            R_BL = R_BP @ joint.R_PL
             if joint.kind == "fixed":
                 waiting.append(Member(urdf.links[joint.child], R_BL, p_B))
             else:

@@ -64,7 +64,7 @@ class UrdfJoint:
     kind: str
     parent: str
     child: str
-    rotation: Array  # (3, 3) child to parent at angle 0
+    R_PL: Array  # (3, 3) child to parent at angle 0
     position: Array  # (3,) m    of the child's frame in the parent's
     yaw: float | None  # rad    of the rotation when it is about z alone
     axis: Array  # (3,) in the child's frame, unit length
@@ -167,7 +167,7 @@ def _joint(element: ET.Element, where: str, ignored: Counter[str]) -> UrdfJoint:
         kind=kind,
         parent=_end(element, "parent", where),
         child=_end(element, "child", where),
-        rotation=R_PL,
+        R_PL=R_PL,
         position=p_P,
         yaw=angles[2] if angles[:2] == [0.0, 0.0] else None,
         axis=_axis(element, where) if moves else np.zeros(3),

@@ -42,20 +42,20 @@ class FoundLeg:
 
 
 def find_legs(
-    torso: Body, origin: Array, axes: Array, *, keep_frames: bool, where: str
+    torso: Body, origin: Array, R_BT: Array, *, keep_frames: bool, where: str
 ) -> list[FoundLeg]:
     """Returns the six legs in the order LF LM LR RF RM RR. Raises RobotError.
 
-    origin (3,) and axes (3, 3): the torso's frame in the root link's.
+    origin (3,) and R_BT (3, 3): the torso's frame in the root link's.
     """
     if len(torso.branches) != len(LEG_NAMES):
         raise _not_six(torso, where)
     chains = [_chain(branch, where) for branch in torso.branches]
-    hips = np.array([axes.T @ (chain[0].position - origin) for chain in chains])
+    hips = np.array([R_BT.T @ (chain[0].position - origin) for chain in chains])
     order = _order(hips, [chain[0].joint.name for chain in chains], where)
     middle = hips.mean(axis=0)
     return [
-        _leg(name, chains[k], hips[k], hips[k] - middle, axes, keep_frames=keep_frames, where=where)
+        _leg(name, chains[k], hips[k], hips[k] - middle, R_BT, keep_frames=keep_frames, where=where)
         for name, k in zip(LEG_NAMES, order, strict=True)
     ]
 
@@ -113,48 +113,45 @@ def _leg(
     chain: tuple[Branch, Branch, Branch],
     hip: Array,
     outwards: Array,
-    axes: Array,
+    R_BT: Array,
     *,
     keep_frames: bool,
     where: str,
 ) -> FoundLeg:
-    turns = [axes.T @ chain[0].rotation]  # links' axes to the torso's at angle 0
-    for branch in chain[1:]:
-        turns.append(turns[-1] @ branch.rotation)
-    wanted = None if keep_frames else _pattern_yaw(turns, chain, outwards)
-    yaw, R_HC = _yaw(chain[0], turns[0], wanted, plain=bool((axes == np.eye(3)).all()))
-    turns = [R_HC, R_HC @ chain[1].rotation, R_HC @ chain[1].rotation @ chain[2].rotation]
+    R_BC, R_CF, R_FS = (branch.R_BL for branch in chain)  # at angle 0
+    R_TC = R_BT.T @ R_BC
+    R_TF = R_TC @ R_CF
+    wanted = None if keep_frames else _pattern_yaw((R_TC, R_TF, R_TF @ R_FS), chain, outwards)
+    yaw, R_HC = _yaw(chain[0], R_TC, wanted, plain=np.array_equal(R_BT, np.eye(3)))
+    R_HF = R_HC @ R_CF
+    R_HS = R_HF @ R_FS
     foot, radius = foot_of(chain[2].body)
-    tips = [
-        turns[0] @ chain[1].position,
-        turns[1] @ chain[2].position,
-        None if foot is None else turns[2] @ foot,
-    ]
+    end = None if foot is None else R_HS @ foot
+    tips = (R_HC @ chain[1].position, R_HF @ chain[2].position, end)
     table: dict[str, Any] = {"hip_position": hip.tolist(), "hip_yaw": yaw}
     other_way = []
-    for joint, pattern, branch, R_HB, tip in zip(
-        JOINT_NAMES, PATTERN, chain, turns, tips, strict=True
-    ):
-        axis, sign = _axis(R_HB @ branch.joint.axis, pattern if wanted is not None else None)
+    links = zip(JOINT_NAMES, PATTERN, chain, (R_HC, R_HF, R_HS), tips, strict=True)
+    for joint, pattern, branch, R_HL, tip in links:
+        axis, sign = _axis(R_HL @ branch.joint.axis, pattern if wanted is not None else None)
         other_way += [branch.joint.name] if sign < 0.0 else []
-        table[joint] = _link(branch, R_HB, tip, axis, sign, where)
+        table[joint] = _link(branch, R_HL, tip, axis, sign, where)
     names = tuple(branch.joint.name for branch in chain)
     return FoundLeg(name, table, names, tuple(other_way), radius, foot, chain)
 
 
 def _pattern_yaw(
-    turns: list[Array], chain: tuple[Branch, Branch, Branch], outwards: Array
+    R_TL: tuple[Array, ...], chain: tuple[Branch, Branch, Branch], outwards: Array
 ) -> float | None:
     """Returns the hip's yaw [rad] at which the axes equal the controller's up to their signs, or
     None.
     """
-    coxa, femur, tibia = (R_TB @ one.joint.axis for R_TB, one in zip(turns, chain, strict=True))
+    coxa, femur, tibia = (R @ one.joint.axis for R, one in zip(R_TL, chain, strict=True))
     if np.hypot(*coxa[:2]) > PATTERN_TOLERANCE or abs(femur[2]) > PATTERN_TOLERANCE:
         return None
     if np.linalg.norm(cross(femur, tibia)) > PATTERN_TOLERANCE:
         return None
     x = cross(femur, Z)
-    way = (turns[0] @ chain[1].position) @ x
+    way = (R_TL[0] @ chain[1].position) @ x
     way = way if abs(way) > SHORT else outwards @ x
     x = -x if way < 0.0 else x
     return math.atan2(x[1], x[0])
@@ -171,7 +168,8 @@ def _yaw(coxa: Branch, R_TC: Array, wanted: float | None, *, plain: bool) -> tup
         if abs(turn) <= SAME_YAW:
             return printed, np.eye(3)
     yaw = math.atan2(R_TC[1, 0], R_TC[0, 0]) if wanted is None else wanted
-    return yaw, axis_rotation(Z, -yaw) @ R_TC
+    R_HT = axis_rotation(Z, -yaw)
+    return yaw, R_HT @ R_TC
 
 
 def _axis(axis: Array, pattern: Array | None) -> tuple[Array, float]:
@@ -197,7 +195,7 @@ def foot_of(tibia: Body) -> tuple[Array | None, float | None]:
 
 
 def _link(
-    branch: Branch, R_HB: Array, tip: Array | None, axis: Array, sign: float, where: str
+    branch: Branch, R_HL: Array, tip: Array | None, axis: Array, sign: float, where: str
 ) -> dict[str, Any]:
     """Returns a link's table, in hip axes."""
     inertial, joint = branch.body.inertial(where), branch.joint
@@ -207,8 +205,8 @@ def _link(
     return {
         "mass": inertial.mass,
         **place,
-        "com": (R_HB @ inertial.com).tolist(),
-        "inertia": inertia_entries(R_HB @ inertial.inertia @ R_HB.T),
+        "com": (R_HL @ inertial.com).tolist(),
+        "inertia": inertia_entries(R_HL @ inertial.inertia @ R_HL.T),
         "axis": axis.tolist(),
         "angle_min": limits[0],
         "angle_max": limits[1],

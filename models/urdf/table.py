@@ -145,20 +145,20 @@ def _found(
         root.members, key=lambda member: member.link.inertial.mass if member.link.inertial else 0.0
     )
     origin = heaviest.position
-    axes = np.round(axis_rotation(np.array([0.0, 0.0, 1.0]), FORWARD[forward])) + 0.0
+    R_BT = np.round(axis_rotation(np.array([0.0, 0.0, 1.0]), FORWARD[forward])) + 0.0
     torso = {
         "mass": inertial.mass,
-        "com": (axes.T @ (inertial.com - origin) + 0.0).tolist(),
-        "inertia": inertia_entries(axes.T @ inertial.inertia @ axes + 0.0),
+        "com": (R_BT.T @ (inertial.com - origin) + 0.0).tolist(),
+        "inertia": inertia_entries(R_BT.T @ inertial.inertia @ R_BT + 0.0),
     }
-    torso["size"] = _box(root, axes, torso) or equivalent_box(torso["mass"], torso["inertia"])
-    return torso, find_legs(root, origin, axes, keep_frames=keep_frames, where=urdf.where)
+    torso["size"] = _box(root, R_BT, torso) or equivalent_box(torso["mass"], torso["inertia"])
+    return torso, find_legs(root, origin, R_BT, keep_frames=keep_frames, where=urdf.where)
 
 
-def _box(root: Body, axes: Array, torso: Table) -> list[float] | None:
+def _box(root: Body, R_BT: Array, torso: Table) -> list[float] | None:
     """Returns the extents [m] of the torso's largest box, if it can contain its matter."""
     boxes = [
-        np.abs(axes.T @ member.rotation) @ member.link.box
+        np.abs(R_BT.T @ member.R_BL) @ member.link.box
         for member in root.members
         if member.link.box is not None
     ]

@@ -88,8 +88,8 @@ typedef struct hxJointModel {
   double s_i[3][HX_SLOTS];     /* 1  joint axis, parent's axes */
   double point_i[3][HX_SLOTS]; /* m  parent's centre of mass to the joint's point, parent's axes */
   double point_j[3][HX_SLOTS]; /* m  child's centre of mass to the joint's point, child's axes */
-  double zero[4][HX_SLOTS];    /* 1  rotation from parent's to child's axes at angle 0 */
-  double frame[4][HX_SLOTS];   /* 1  rotation from link axes of hexapod.h to child's axes */
+  double q_i0[4][HX_SLOTS];    /* 1  from 0, the child's axes at angle 0, to the parent's */
+  double q_Lj[4][HX_SLOTS];    /* 1  from the child's axes to the link axes of hexapod.h */
   hxStops stop, own_stop;      /* those in force, and those of the robot, without locks */
 } hxJointModel;
 

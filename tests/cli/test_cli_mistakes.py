@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.cli import main
         (["simulate", "walk_flt"], ["unknown scenario", "did you mean 'walk_flat'"]),
         (
             ["simulate", "--set", "gait.periode=1"],
-            ["walk_flat.toml", "'periode'", "did you mean 'period'"],
+            ["--set gait.periode: ", "did you mean 'period'"],
         ),
         (["simulate", "--set", "macro_step=-0.005"], ["macro_step", "got -0.005", "> 0"]),
         (["simulate", "--control", "complaint"], ["'complaint'", "did you mean 'compliant'"]),
@@ -209,7 +209,12 @@ def test_an_unexpected_error_is_one_line_with_a_hint(
             1,
             {"got": 0, "expected": "1 to 10000", "fix": "write --seeds 10", "where": "--seeds"},
         ),
-        (["simulat"], 2, {"what": "not understood"}),
+        (
+            ["simulat"],
+            2,
+            {"what": "not understood", "got": "simulat", "fix": "did you mean 'simulate'?"},
+        ),
+        (["controller", "old"], 2, {"got": "old", "expected": "one of new"}),
         (
             ["simulate", "--robot", "my.toml"],
             2,

@@ -160,7 +160,7 @@ def test_json_is_all_that_is_printed(
             ["simulate", "--nope"],
             ["No such option: --nope", "hexapod simulate [OPTIONS]", "`hexapod simulate --help`"],
         ),
-        (["simulat"], ["Did you mean 'simulate'", "COMMAND", "--help"]),
+        (["simulat"], ["got 'simulat'", "one of export, simulate", "did you mean 'simulate'"]),
         (["export", "--fmi", "two"], ["--fmi", "integer"]),
         (["simulate", "stand", "walk_flat"], ["(walk_flat)", "[SCENARIO]"]),
         (["simulate", "--set"], ["'--set' requires an argument"]),

@@ -115,6 +115,12 @@ def test_a_name_that_continues_the_given_one_is_the_nearest(name: str, near: str
     assert nearest_name(name, COLUMNS) == near
 
 
+def test_a_name_that_shares_a_few_letters_is_no_nearest_one() -> None:
+    assert nearest_name("trot", ("tripod", "ripple", "wave", "amble")) is None
+    assert nearest_name("tripdo", ("tripod", "ripple", "wave", "amble")) == "tripod"
+    assert nearest_name("my", ("law", "mu")) == "mu"
+
+
 def test_an_unknown_column_is_refused_with_the_nearest_name() -> None:
     with pytest.raises(ColumnError, match=r"got 'torso\.pos'; did you mean 'torso\.position\[1\]'"):
         Recording(COLUMNS, np.zeros((2, 5))).column("torso.pos")

@@ -16,6 +16,7 @@ import pytest
 
 from hexapod_cosim import models
 from hexapod_cosim.models import HexapodError, RobotError, check_robot, load_robot, robot_from_table
+from hexapod_cosim.models.kinematics import foot_positions
 
 FIGURES = 5e-4  # relative; the reference figures are printed with four digits
 Table = dict[str, Any]
@@ -65,6 +66,22 @@ def test_phantomx_has_the_reference_figures() -> None:
     assert robot.legs[3].links[1].tip == (0.06, 0.0, -0.015)
     assert robot.legs[5].links[2].tip == (0.095, 0.0, -0.09)
     assert (robot.servo.torque_max, robot.servo.speed_max) == (3.0, math.pi)
+
+
+@pytest.mark.parametrize(
+    ("name", "radius", "depth"), [("athena", 0.18, 0.12), ("phantomx_mk4", 0.15, 0.10)]
+)
+def test_the_computed_numbers_of_a_robot_file_follow_from_the_others(
+    name: str, radius: float, depth: float
+) -> None:
+    """The stance puts each foot's centre at a radius from its hip and a depth below it [m]."""
+    robot = load_robot(name)
+    half = np.array(robot.torso.size) / 2.0
+    assert robot.body.torso_box == pytest.approx(half - robot.body.corner_radius, abs=1e-12)
+    hips = np.array([leg.hip_position for leg in robot.legs])
+    away = foot_positions(robot, robot.stance) - hips
+    assert np.hypot(away[:, 0], away[:, 1]) == pytest.approx(np.full(6, radius), abs=1e-12)
+    assert away[:, 2] == pytest.approx(np.full(6, -depth), abs=1e-12)
 
 
 def test_a_leg_may_differ_from_the_others() -> None:

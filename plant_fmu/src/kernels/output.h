@@ -278,9 +278,9 @@ static void fill_depths(const hxModel *model, const hxWork *work, hxIndicators *
 /* Fills the motion of the torso. */
 static void fill_torso(const hxPlantMotion *motion, const hxWork *work, hxOutput *o) {
   const hxNumber *m = motion->torso;
-  const hxMat3 R = work->torso.R_WB;
-  hxNumber x[3], y[3], z[3]; /* columns of R */
-  get3(R.x, 0, x), get3(R.y, 0, y), get3(R.z, 0, z);
+  const hxMat3 R_WT = work->torso.R_WB;
+  hxNumber x[3], y[3], z[3]; /* its columns */
+  get3(R_WT.x, 0, x), get3(R_WT.y, 0, y), get3(R_WT.z, 0, z);
   for (int i = 0; i < 3; ++i) {
     o->torso.position[i] = m[HX_R + i];
     o->torso.velocity[i] = m[HX_V + i];
@@ -290,7 +290,7 @@ static void fill_torso(const hxPlantMotion *motion, const hxWork *work, hxOutput
   o->torso.roll = hx_atan2(y[2], z[2]);
   o->torso.pitch = hx_asin(-x[2]);
   o->torso.yaw = hx_atan2(x[1], x[0]);
-  get3(hx_tmul(R, work->torso.w), 0, o->imu.angular_velocity);
+  get3(hx_tmul(R_WT, work->torso.w), 0, o->imu.angular_velocity);
 }
 
 /* Fills the norms of Phi and dPhi/dt over all joints. */

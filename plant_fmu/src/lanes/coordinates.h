@@ -18,17 +18,17 @@ static inline void scatter_joint(hxReal x, int joint, int slot, hxNumber (*table
     table[slot + lane][joint] = hx_lane(x, lane);
 }
 
-/* Places a link on its joint: p_j = p_i zero turn(q) about the child's z, w_j = w_i + qd s; r_j
- * and v_j follow from the joint's point, which both bodies share. */
+/* Places a link on its joint: q_Wj = q_Wi q_i0 q_0j, the last by q about the child's z, w_j = w_i +
+ * qd s; r_j and v_j follow from the joint's point, which both bodies share. */
 static inline void place_link(const hxModel *model, int joint, int slot, hxReal angle, hxReal speed,
                               hxPlantMotion *motion) {
   const hxJointModel *m = &model->joint[joint];
   const hxReal zero = hx_splat(0.0);
   hxReal sine, cosine;
   hx_lanes_sin_cos(0.5 * angle, &sine, &cosine);
-  const hxQuat from = hx_quat_mul(hx_parent_quat(motion, joint, slot), hx_load_quat(m->zero, slot));
-  hx_store_quat(&motion->link[joint][HX_P], slot,
-                hx_quat_mul(from, (hxQuat){cosine, zero, zero, sine}));
+  const hxQuat q_Wi = hx_parent_quat(motion, joint, slot), q_i0 = hx_load_quat(m->q_i0, slot);
+  const hxQuat q_W0 = hx_quat_mul(q_Wi, q_i0), q_0j = {cosine, zero, zero, sine};
+  hx_store_quat(&motion->link[joint][HX_P], slot, hx_quat_mul(q_W0, q_0j));
   const hxBody i = hx_parent_body(motion, joint, slot);
   const hxVec3 s = hx_mul(i.R_WB, hx_load_vec3(m->s_i, slot)), w_j = hx_add_scaled(i.w, speed, s);
   hx_store_vec3(&motion->link[joint][HX_W], slot, w_j);

@@ -331,10 +331,10 @@ HX_RARE void leg_pairs(const hxModel *model, const hxContactState *state,
 /* Computes orientation and inertia of the torso. */
 HX_INLINE void torso_pass(const hxModel *model, const hxPlantMotion *motion, hxWork *work) {
   const hxNumber *J = model->torso_inertia;
-  const hxSym3 body = {hx_splat(J[0]), hx_splat(J[1]), hx_splat(J[2]),
-                       hx_splat(J[3]), hx_splat(J[4]), hx_splat(J[5])};
+  const hxSym3 J_B = {hx_splat(J[0]), hx_splat(J[1]), hx_splat(J[2]),
+                      hx_splat(J[3]), hx_splat(J[4]), hx_splat(J[5])};
   work->torso = hx_torso_body(motion);
-  work->torso_J = hx_rotate_sym3(work->torso.R_WB, body);
+  work->torso_J = hx_rotate_sym3(work->torso.R_WB, J_B);
 }
 
 /* Computes positions, velocities and forces at (t, y). Fills work except for the sweeps; with

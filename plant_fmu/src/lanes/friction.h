@@ -84,9 +84,8 @@ HX_INLINE hxBristle hx_bristle_friction(const hxModel *model, hxFrictionAt at, h
   const hxVec3 d = hx_scale(hx_splat(1.5 * model->bristle_damping * per_length), rate);
   const hxReal spring = (1.5 - 0.5 * within * within) / hx_max(size, one);
   const hxReal room = 1.0 - spring * size;
-  const hxReal share =
-      room / hx_sqrt(room * room + hx_dot(d, d) +
-                     1e-30); /* 1e-30: without room and motion the share is 0, not 0/0 */
+  /* 1e-30: without room and motion the share is 0, not 0/0 */
+  const hxReal share = room / hx_sqrt(room * room + hx_dot(d, d) + 1e-30);
   const hxVec3 w = hx_add_scaled(hx_scale(spring, u), share, d);
   const hxReal mu = hx_stribeck_curve(model, at, release_rate * size);
   return (hxBristle){

@@ -60,13 +60,13 @@ static inline hxBody hx_parent_body(const hxPlantMotion *motion, int joint, int 
   return joint > 0 ? hx_link_body(motion, joint - 1, slot) : hx_torso_body(motion);
 }
 
-/* Computes sine and cosine of half the joint angle q from p_rel = conj(p_i zero) p_j: its
+/* Computes sine and cosine of half the joint angle q from q_0j = conj(q_Wi q_i0) q_Wj: its
  * component along the axis, the child's z, and its real part. */
-static inline void hx_joint_half_angle(const hxJointModel *model, int slot, hxQuat i, hxQuat j,
-                                       hxReal *sine, hxReal *cosine) {
-  const hxQuat from = hx_quat_mul(i, hx_load_quat(model->zero, slot));
-  *sine = from.w * j.z - from.z * j.w - from.x * j.y + from.y * j.x;
-  *cosine = from.w * j.w + from.x * j.x + from.y * j.y + from.z * j.z;
+static inline void hx_joint_half_angle(const hxJointModel *model, int slot, hxQuat q_Wi,
+                                       hxQuat q_Wj, hxReal *sine, hxReal *cosine) {
+  const hxQuat q_W0 = hx_quat_mul(q_Wi, hx_load_quat(model->q_i0, slot));
+  *sine = q_W0.w * q_Wj.z - q_W0.z * q_Wj.w - q_W0.x * q_Wj.y + q_W0.y * q_Wj.x;
+  *cosine = q_W0.w * q_Wj.w + q_W0.x * q_Wj.x + q_W0.y * q_Wj.y + q_W0.z * q_Wj.z;
 }
 
 /* Computes the axis and the points of a joint from the orientations of parent and child. */
@@ -99,7 +99,7 @@ static inline hxConstraint hx_joint_constraint(const hxModel *model, const hxPla
       .dphi = {k.sy * w_ij_j.z - k.sz * w_ij_j.y, k.sz * w_ij_j.x - k.sx * w_ij_j.z}};
 }
 
-/* Projects a link onto its joint. The smallest rotation aligns the child's z with the axis, a
+/* Projects a link onto its joint. The smallest rotation q_WV aligns the child's z with the axis, a
  * translation restores the joint's point, and velocities keep only the rotation about the axis. */
 static inline void project_link(const hxModel *model, int joint, int slot, hxPlantMotion *motion) {
   const hxBody i = hx_parent_body(motion, joint, slot), drifted = hx_link_body(motion, joint, slot);
@@ -108,9 +108,8 @@ static inline void project_link(const hxModel *model, int joint, int slot, hxPla
   const hxVec3 s = hx_mul(i.R_WB, hx_load_vec3(model->joint[joint].s_i, slot)), z = drifted.R_WB.z;
   const hxReal twice = 1.0 + hx_dot(z, s), scale = 1.0 / hx_sqrt(2.0 * twice);
   const hxVec3 u = hx_scale(scale, hx_cross(z, s));
-  const hxQuat turn = {scale * twice, u.x, u.y, u.z};
-  hx_store_quat(&motion->link[joint][HX_P], slot,
-                hx_quat_mul(turn, hx_link_quat(motion, joint, slot)));
+  const hxQuat q_WV = {scale * twice, u.x, u.y, u.z}, q_Vj = hx_link_quat(motion, joint, slot);
+  hx_store_quat(&motion->link[joint][HX_P], slot, hx_quat_mul(q_WV, q_Vj));
   const hxVec3 w_j = hx_add_scaled(i.w, hx_dot(s, hx_sub3(drifted.w, i.w)), s);
   hx_store_vec3(&motion->link[joint][HX_W], slot, w_j);
   const hxBody j = hx_link_body(motion, joint, slot);

@@ -40,27 +40,28 @@ HX_RARE void further_moments(const hxModel *model, const hxContactState *state,
 }
 
 /* Returns the depths of a row of contacts of bodies with centres of mass r, on a grid at most. */
-HX_INLINE hxReal depth_bound(const hxModel *model, int row, int slot, hxVec3 r, const hxMat3 *R) {
-  const hxVec3 point = hx_add3(r, hx_mul(*R, hx_load_vec3(model->point[row], slot)));
+HX_INLINE hxReal depth_bound(const hxModel *model, int row, int slot, hxVec3 r,
+                             const hxMat3 *R_WB) {
+  const hxVec3 point = hx_add3(r, hx_mul(*R_WB, hx_load_vec3(model->point[row], slot)));
   if (model->terrain_kind == HX_TERRAIN_GRID) return hx_grid_depth_bound(model, row, &point);
   return model->radius[row] - hx_ground(model, NULL, row, slot, 0, point, NULL).distance;
 }
 
 /* Returns the largest of these of knees and shanks, from the centre of mass of their tibias. */
 HX_INLINE hxReal tibia_depth_bound(const hxModel *model, const hxPlantMotion *motion, int slot,
-                                   const hxMat3 *R, hxReal largest) {
+                                   const hxMat3 *R_WB, hxReal largest) {
   const hxVec3 r = hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot);
   for (int k = model->foot_rows; k < model->rows; ++k)
-    largest = hx_max(largest, depth_bound(model, model->row[k], slot, r, R));
+    largest = hx_max(largest, depth_bound(model, model->row[k], slot, r, R_WB));
   return largest;
 }
 
 /* Returns the largest of these of the torso's points. */
 HX_INLINE hxReal torso_depth_bound(const hxModel *model, const hxPlantMotion *motion,
-                                   const hxMat3 *R, hxReal largest) {
+                                   const hxMat3 *R_WB, hxReal largest) {
   const hxVec3 r = hx_torso_vec3(motion, HX_R);
   for (int slot = 0; slot < HX_SLOTS; slot += HX_LANES)
-    largest = hx_max(largest, depth_bound(model, HX_TORSO, slot, r, R));
+    largest = hx_max(largest, depth_bound(model, HX_TORSO, slot, r, R_WB));
   return largest;
 }
 

@@ -66,10 +66,10 @@ void hx_joint_on_parent(const hxDefinition *d, int leg, int joint, double point[
   }
 }
 
-void hx_zero_turn(const hxDefinition *d, int leg, int joint, double p[4]) {
+void hx_zero_turn(const hxDefinition *d, int leg, int joint, double q_PL[4]) {
   const double half = joint == 0 ? 0.5 * d->leg[leg].hip_yaw : 0.0;
-  hx_sin_cos(half, &p[3], &p[0]);
-  p[1] = p[2] = 0.0;
+  hx_sin_cos(half, &q_PL[3], &q_PL[0]);
+  q_PL[1] = q_PL[2] = 0.0;
 }
 
 /* Computes the quaternion of a right-handed frame from its axes, by the largest component
@@ -87,11 +87,11 @@ static void quat_from_axes(const double x[3], const double y[3], const double z[
   hx_vector_normalise(columns[largest], 4, p);
 }
 
-void hx_joint_frame(const hxDefinition *d, int leg, int joint, double p[4]) {
+void hx_joint_frame(const hxDefinition *d, int leg, int joint, double q_Lj[4]) {
   double s[3], a[3], b[3];
-  p[0] = 1.0, p[1] = p[2] = p[3] = 0.0;
+  q_Lj[0] = 1.0, q_Lj[1] = q_Lj[2] = q_Lj[3] = 0.0;
   if (joint < 0) return;
   hx_vector_normalise(d->leg[leg].link[joint].axis, 3, s);
   hx_axis_normals(s, a, b);
-  quat_from_axes(a, b, s, p);
+  quat_from_axes(a, b, s, q_Lj);
 }

@@ -25,28 +25,29 @@ static void inertia_in_frame(const double S[6], const double p[4], double out[6]
 /* Computes the constants of a leg's joint in slots: all vectors in joint axes. */
 static void compile_joint(hxJointModel *m, const hxDefinition *d, int leg, int joint, int slot) {
   const hxLink *link = &d->leg[leg].link[joint];
-  double frame_i[4], frame_j[4], to_i[4], to_j[4], turn[4], from[4], zero[4], s_j[3], axis[3],
-      s_i[3], point[3], point_i[3], point_j[3], inertia[6];
-  hx_joint_frame(d, leg, joint - 1, frame_i);
-  hx_joint_frame(d, leg, joint, frame_j);
-  hx_quaternion_conjugate(frame_i, to_i);
-  hx_quaternion_conjugate(frame_j, to_j);
-  hx_zero_turn(d, leg, joint, turn);
-  hx_quaternion_product(to_i, turn, from);
-  hx_quaternion_product(from, frame_j, zero);
-  hx_vector_normalise(link->axis, 3, s_j);
-  hx_vector_rotate(turn, s_j, axis); /* axis and point: in the parent link's axes */
-  hx_vector_rotate(to_i, axis, s_i);
-  hx_joint_on_parent(d, leg, joint, point);
-  hx_vector_rotate(to_i, point, point_i);
-  for (int i = 0; i < 3; ++i) point[i] = -link->com[i];
-  hx_vector_rotate(to_j, point, point_j);
-  inertia_in_frame(link->inertia, frame_j, inertia);
+  /* P, L: axes of the links; i, j: axes of their states. q_PL and q_ij are those at angle 0 */
+  double q_Pi[4], q_Lj[4], q_iP[4], q_jL[4], q_PL[4], q_iL[4], q_ij[4], s_L[3], s_P[3], s_i[3],
+      point_P[3], point_L[3], point_i[3], point_j[3], J_j[6];
+  hx_joint_frame(d, leg, joint - 1, q_Pi);
+  hx_joint_frame(d, leg, joint, q_Lj);
+  hx_quaternion_conjugate(q_Pi, q_iP);
+  hx_quaternion_conjugate(q_Lj, q_jL);
+  hx_zero_turn(d, leg, joint, q_PL);
+  hx_quaternion_product(q_iP, q_PL, q_iL);
+  hx_quaternion_product(q_iL, q_Lj, q_ij);
+  hx_vector_normalise(link->axis, 3, s_L);
+  hx_vector_rotate(q_PL, s_L, s_P);
+  hx_vector_rotate(q_iP, s_P, s_i);
+  hx_joint_on_parent(d, leg, joint, point_P);
+  hx_vector_rotate(q_iP, point_P, point_i);
+  for (int i = 0; i < 3; ++i) point_L[i] = -link->com[i];
+  hx_vector_rotate(q_jL, point_L, point_j);
+  inertia_in_frame(link->inertia, q_Lj, J_j);
   m->mass[slot] = link->mass;
-  for (int i = 0; i < 6; ++i) m->inertia[i][slot] = inertia[i];
+  for (int i = 0; i < 6; ++i) m->inertia[i][slot] = J_j[i];
   for (int i = 0; i < 3; ++i)
     m->s_i[i][slot] = s_i[i], m->point_i[i][slot] = point_i[i], m->point_j[i][slot] = point_j[i];
-  for (int i = 0; i < 4; ++i) m->zero[i][slot] = zero[i], m->frame[i][slot] = frame_j[i];
+  for (int i = 0; i < 4; ++i) m->q_i0[i][slot] = q_ij[i], m->q_Lj[i][slot] = q_Lj[i];
   m->own_stop.middle[slot] = 0.5 * (link->angle_min + link->angle_max);
   m->own_stop.half_range[slot] = 0.5 * (link->angle_max - link->angle_min);
   m->own_stop.stiffness[slot] = d->servo.stop_stiffness;
@@ -71,12 +72,12 @@ static void compile_ground(hxModel *model, const hxDefinition *d) {
 static void set_tibia_point(hxModel *model, const hxDefinition *d, int leg, int slot, int row,
                             const double from_joint[3]) {
   const double *com = d->leg[leg].link[HX_JOINTS - 1].com;
-  double frame[4], to_joint[4], from_com[3], point[3];
-  for (int i = 0; i < 3; ++i) from_com[i] = from_joint[i] - com[i];
-  hx_joint_frame(d, leg, HX_JOINTS - 1, frame);
-  hx_quaternion_conjugate(frame, to_joint);
-  hx_vector_rotate(to_joint, from_com, point);
-  for (int i = 0; i < 3; ++i) model->point[row][i][slot] = point[i];
+  double q_Lj[4], q_jL[4], point_L[3], point_j[3]; /* from the centre of mass */
+  for (int i = 0; i < 3; ++i) point_L[i] = from_joint[i] - com[i];
+  hx_joint_frame(d, leg, HX_JOINTS - 1, q_Lj);
+  hx_quaternion_conjugate(q_Lj, q_jL);
+  hx_vector_rotate(q_jL, point_L, point_j);
+  for (int i = 0; i < 3; ++i) model->point[row][i][slot] = point_j[i];
 }
 
 /* Computes the centres of a leg's contacts: the foot at the tibia's tip, the knee at its joint,

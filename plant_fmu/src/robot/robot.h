@@ -61,13 +61,13 @@ void hx_link_tip(const hxLink *link, double tip[3]);
 /* Computes the joint's point from the parent's centre of mass, in the parent link's axes. */
 void hx_joint_on_parent(const hxDefinition *d, int leg, int joint, double point[3]);
 
-/* Computes the rotation from the parent's to the child's axes at angle 0: the hip's yaw for the
- * coxa, identity for the others. */
-void hx_zero_turn(const hxDefinition *d, int leg, int joint, double p[4]);
+/* Computes the rotation q_PL of a link in its parent's axes at angle 0: the hip's yaw for the coxa,
+ * identity for the others. */
+void hx_zero_turn(const hxDefinition *d, int leg, int joint, double q_PL[4]);
 
-/* Computes the rotation from a link's axes to its joint's (x = a, y = b, z = axis); identity for
- * the torso. */
-void hx_joint_frame(const hxDefinition *d, int leg, int joint, double p[4]);
+/* Computes the rotation q_Lj of the joint's axes (x = a, y = b, z = axis) in the link's; identity
+ * for the torso. */
+void hx_joint_frame(const hxDefinition *d, int leg, int joint, double q_Lj[4]);
 
 HX_HIDDEN_END
 
