@@ -4,9 +4,9 @@ see, and with BAM's scheme; prints each row of the table in docs/reality.md.
 usage: python -m benchmarks.identify.servos [--kscale FOLDER] [--pictures FOLDER] [--workers N]
        [-o FILE.csv]
 
-The logs are not part of the repository: those of an XL330 are read from ../shared/data/servo_logs,
-those of K-Scale (github.com/kscalelabs/sysid, commit ca1ecb1) from a folder that is given. What is
-not there is left out with a note.
+The logs are not part of the repository: those of an XL330 (github.com/Rhoban/bam) are read from the
+folder shared/data/servo_logs beside the repository, those of K-Scale (github.com/kscalelabs/sysid,
+commit ca1ecb1) from a folder that is given. What is not there is left out with a note.
 """
 
 from __future__ import annotations
