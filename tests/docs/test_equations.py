@@ -11,6 +11,7 @@ import re
 from pathlib import Path
 
 import pytest
+from pages import COMMANDS
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "equations.md"
@@ -185,3 +186,23 @@ def test_a_function_of_the_plant_has_the_name_of_its_equation_in_models() -> Non
 def test_the_laws_of_a_file_have_their_names_in_both_languages(file: str, names: str) -> None:
     ours = {name for of, name in functions_of_the_plant() if of == file}
     assert ours - set(IN_C_WITH_REASON) == set(names.split())
+
+
+# of files of the repository, as comments and docstrings name them
+NAMED = re.compile(
+    r"(?<![\w/.\-{}])((?:models|plant_fmu|fmi|controller|cosim|extensions|tests|docs|tools|benchmarks)"
+    r"/[\w/]+\.(?:py|c|h|toml|md))\b"
+)
+
+
+def test_files_that_the_code_names_exist() -> None:
+    count = 0
+    for path in cited_files():
+        for name in NAMED.findall(path.read_text(encoding="utf-8")):
+            count += 1
+            extension = ROOT / "extensions" / name.split("/")[1]
+            deleted = extension.name in COMMANDS and not extension.is_dir()
+            places = (ROOT, *path.parents)  # the page of an extension names its own folders
+            found = any((place / name).exists() for place in places if place.is_relative_to(ROOT))
+            assert found or deleted, f"{path.relative_to(ROOT)} names {name}, which is not there"
+    assert count > 100

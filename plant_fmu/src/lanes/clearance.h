@@ -1,5 +1,5 @@
 /* clearance.h - distances between the femurs and tibias of neighbouring legs, as capsules, and the
- * forces between those that touch (eq. 56); models/contact/pairs.py and models/contact/pairs.py
+ * forces between those that touch (eq. 56); models/contact/bodies.py and models/contact/forces.py
  * are the readable forms */
 #ifndef HX_CLEARANCE_H
 #define HX_CLEARANCE_H
