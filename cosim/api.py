@@ -122,11 +122,12 @@ def report(results: Result | Sequence[Result], folder: str | Path) -> Path:
     An earlier run's files in the folder are replaced. Raises HexapodError when a run did not
     complete, when two runs have one label, and when the folder cannot be used.
     """
-    kinds, expected = (Result, Sequence), "a result of simulate(), or several"
-    check_type(results or None, kinds, expected, where="results")
+    expected = "a result of simulate(), or several"
     check_type(folder, (str, Path), "the path of a folder", where="folder")
-    runs = [results] if isinstance(results, Result) else list(results)
-    for run in runs:
+    given: Any = results
+    several = isinstance(given, Sequence) and not isinstance(given, str)
+    runs: list[Any] = list(given) if several else [given]
+    for run in runs or [None]:
         check_type(run, Result, expected, where="results")
     labels = [
         control.label

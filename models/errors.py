@@ -82,7 +82,6 @@ def check_type(
         "wrong type of an argument",
         got="nothing (None)" if value is None else value,
         expected=expected,
-        fix=f"give {expected}",
         where=where,
     )
 

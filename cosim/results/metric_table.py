@@ -8,6 +8,18 @@ from typing import NamedTuple
 import numpy as np
 
 from hexapod_cosim.cosim.results.window import friction_law
+from hexapod_cosim.models import HexapodError, unknown_name
+
+
+class UnknownMetricError(HexapodError, KeyError):
+    """A metric that there is not."""
+
+
+class Metrics(dict[str, float]):
+    """Metrics by name; an unknown name is refused with the nearest one."""
+
+    def __missing__(self, name: str) -> float:
+        raise unknown_name("metric", name, self, error=UnknownMetricError)
 
 
 class Metric(NamedTuple):

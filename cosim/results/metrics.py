@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.interface.names import (
 )
 from hexapod_cosim.cosim.master.connection import FLAGS
 from hexapod_cosim.cosim.master.recorder import Recording
-from hexapod_cosim.cosim.results.metric_table import METRICS, PER_RADIAN
+from hexapod_cosim.cosim.results.metric_table import METRICS, PER_RADIAN, Metrics
 from hexapod_cosim.cosim.results.support import body_height, real_feet, stability_margins
 from hexapod_cosim.cosim.results.window import (
     CONTACT_SHARE,
@@ -75,12 +75,12 @@ def metric_columns(*, bristles: bool) -> tuple[str, ...]:
     return (*_JUDGED, *_JUDGED_BRISTLES) if bristles else _JUDGED
 
 
-def compute_metrics(view: View, *, servo: Servo, realtime_factor: float) -> dict[str, float]:
+def compute_metrics(view: View, *, servo: Servo, realtime_factor: float) -> Metrics:
     """Computes all METRICS of a run; the servo gives continuous rating and motor constant."""
     window = view.window
     of_the_run = {"energy_residual": view.energy_residual, "realtime_factor": realtime_factor}
     if window is None:
-        return dict.fromkeys(METRICS, np.nan) | of_the_run
+        return Metrics(dict.fromkeys(METRICS, np.nan) | of_the_run)
     parameters = view.parameters
     figures = _slip(window, parameters) | _cone(window, parameters) | _feet(window, parameters)
     figures |= (
@@ -91,7 +91,7 @@ def compute_metrics(view: View, *, servo: Servo, realtime_factor: float) -> dict
         float(np.nanmin(margins)) if np.isfinite(margins).any() else np.nan
     )
     figures |= of_the_run
-    return {name: float(figures[name]) for name in METRICS}
+    return Metrics((name, float(figures[name])) for name in METRICS)
 
 
 def _per(window: JudgedWindow, amount: float, name: str) -> dict[str, float]:

@@ -76,7 +76,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   hxStatus status = hx_definition_check(definition, message);
   if (status == HX_OK) status = hx_plant_check_terrain(plant, definition, message);
   if (status != HX_OK) return hx_plant_fail(plant, status, message);
-  plant->feet = plant->model;
+  plant->before = plant->model;
   *plant->state_before = plant->state;
   memset(&plant->model, 0, sizeof plant->model);
   memset(&plant->state, 0, sizeof plant->state);
@@ -87,7 +87,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   /* the cells of feet on blocks are known now */
   status = hx_plant_check_start(plant, message);
   if (status != HX_OK) {
-    plant->model = plant->feet;
+    plant->model = plant->before;
     plant->state = *plant->state_before;
     hx_plant_derive_feet(plant);
     return hx_plant_fail(plant, status, message);

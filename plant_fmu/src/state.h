@@ -1,8 +1,8 @@
 /* state.h - data of a plant: the model (constants compiled from the definition) and the state.
  *
  * Legs are stored innermost, [quantity][component][slot]. But for the terrain, whose checksum a
- * saved state holds, the structures hold no pointers, so a copy of their bytes is a copy of the
- * plant.
+ * saved state holds, model and state hold no pointers, so a copy of their bytes is a copy of what
+ * they stand for. hxPlant also has addresses of its work space.
  */
 #ifndef HX_STATE_H
 #define HX_STATE_H
@@ -320,10 +320,11 @@ typedef struct hxState {
 
 struct hxPlant {
   hxModel model;
-  /* the model with the rows of feet alone: open contacts exert no force, so steps without their
-   * rows have the same bits. While hx_plant_reset and hx_plant_tune run, it holds the model from
-   * before the call instead, because a further model would enlarge every instance */
-  hxModel feet;
+  union {           /* in one place, because a further model would enlarge every instance */
+    hxModel feet;   /* with the rows of feet alone: open contacts exert no force, so steps without
+                     * their rows have the same bits */
+    hxModel before; /* while hx_plant_reset and hx_plant_tune run: the model before the call */
+  };
   hxState state;
   const hxTerrain *terrain; /* of later resets */
   char message[HX_MESSAGE_SIZE];

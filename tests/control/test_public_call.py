@@ -265,7 +265,7 @@ def test_calls_refuse_arguments_of_another_type(
     assert str(refused.value).startswith(message.format("wrong type of an argument"))
 
 
-@pytest.mark.parametrize("results", [3, [], [3]])
+@pytest.mark.parametrize("results", [3, [], [3], "out/walk"])
 def test_a_report_of_no_result_is_refused(results: Any, tmp_path: Path) -> None:
     with pytest.raises(HexapodError, match="results: wrong type of an argument"):
         hexapod_cosim.report(results, tmp_path / "out")

@@ -12,11 +12,18 @@ from walks import CYCLES, PARAMETERS, PERIOD, SERVO, WEIGHT, H, SyntheticRun
 from hexapod_cosim.cosim.interface.names import foot_names, joint_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.report.tables import metric_rows, number
-from hexapod_cosim.cosim.results.metric_table import METRICS
+from hexapod_cosim.cosim.results.metric_table import METRICS, Metrics
 from hexapod_cosim.cosim.results.metrics import compute_metrics, percentiles
 from hexapod_cosim.cosim.results.window import View
 from hexapod_cosim.cosim.run.single_run import simulate
 from hexapod_cosim.cosim.scenario.reading import load_scenario
+
+
+def test_an_unknown_metric_is_refused_with_the_nearest_name() -> None:
+    metrics = Metrics(slip_per_metre=0.2)
+    assert metrics["slip_per_metre"] == 0.2
+    with pytest.raises(KeyError, match=r"got 'slip_per_meter', .*'slip_per_metre'"):
+        metrics["slip_per_meter"]
 
 
 def test_the_metrics_are_those_of_the_contract_with_slip_after_what_is_exactly_measured() -> None:

@@ -18,7 +18,13 @@ from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.contact.geometry import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.kinematics import joint_angles, joint_speeds
-from hexapod_cosim.models.servos.motor import duty_share, held_commands, supply_power, warm_servo
+from hexapod_cosim.models.servos.motor import (
+    duty_share,
+    held_commands,
+    remaining_rating,
+    supply_power,
+    warm_servo,
+)
 
 WARM: dict[str, Any] = {
     "winding_capacity": 5.0,
@@ -91,6 +97,7 @@ def test_a_hot_motor_gets_less(core: ct.CDLL, start: float, share: float, left: 
     servo = robot.servo
     assert output.current[3, 2] == pytest.approx(share * VOLTS / servo.resistance, rel=EXACT)
     assert output.remaining_rating[3, 2] == pytest.approx(left, rel=EXACT)
+    assert float(remaining_rating(servo, np.array(start))) == pytest.approx(left, rel=EXACT)
     assert float(duty_share(servo, np.array(start))) == pytest.approx(share, rel=EXACT)
 
 

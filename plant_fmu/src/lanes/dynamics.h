@@ -125,7 +125,7 @@ static inline void leg_multipliers(const hxModel *model, const hxImplicit *impli
         hx_sub3(hx_add3(k->gyroscopic, handed.ang), hx_sym_mul(k->J, k->acceleration.ang));
     const hxVec3 about_joint = hx_sub3(ang, hx_cross(kin->sP_j, lin));
     const hxReal along = hx_dot(about_joint, kin->s), inverse_sz = 1.0 / kin->sz;
-    if (model->servo_mode == HX_SERVO_KINEMATIC) {
+    if (model->servo_mode == HX_SERVO_KINEMATIC) { /* the drive's torque is a multiplier (eq. 13) */
       k->torque = model->rotor_inertia * k->qdd - along;
       if (model->spin) k->torque += model->spin_inertia * k->rotor.turn;
       k->servo.torque = k->torque - k->servo.friction;
@@ -134,7 +134,7 @@ static inline void leg_multipliers(const hxModel *model, const hxImplicit *impli
     k->reaction.lambda[0] = (along * kin->sy - hx_dot(about_joint, k->body.R_WB.y)) * inverse_sz;
     k->reaction.lambda[1] = (hx_dot(about_joint, k->body.R_WB.x) - along * kin->sx) * inverse_sz;
     handed = (hxForce6){hx_add3(about_joint, hx_cross(kin->sP_i, lin)), lin};
-    if (model->spin && joint > 0) {
+    if (model->spin && joint > 0) { /* the rotor's momentum is the parent's to change (eq. 54) */
       const hxVec3 turned = hx_cross(leg->joint[joint - 1].body.w, kin->s);
       const hxVec3 change =
           hx_add3(hx_scale(k->rotor.acceleration, kin->s), hx_scale(k->speed, turned));

@@ -42,7 +42,7 @@ hxStatus hx_plant_tune(hxPlant *plant, const hxDefinition *definition) {
   const hxStatus status = hx_definition_check(definition, message);
   if (status != HX_OK) return hx_plant_fail(plant, status, message);
   hxState *state = &plant->state;
-  hxModel *model = &plant->model, *before = &plant->feet;
+  hxModel *model = &plant->model, *before = &plant->before;
   const double error = residual(plant);
   hx_plant_get_coordinates(plant, &x);
   *before = *model;
