@@ -108,7 +108,8 @@ def rotor_moments(robot: Robot, body: Array) -> Array:
     moments = np.zeros((BODIES, 3))
     spin = spin_inertia(robot.servo) * joint_speeds(robot, body).ravel()
     for joint, h in zip(joint_models(robot), spin, strict=True):
-        s = rotation_matrix(body[joint.parent, 3:7]) @ joint.s_i
+        R_Wi = rotation_matrix(body[joint.parent, 3:7])
+        s = R_Wi @ joint.s_i
         moments[joint.parent] -= h * cross(body[joint.parent, 10:13], s)
     return moments
 

@@ -22,7 +22,7 @@ class Posture(NamedTuple):
     height: float  # m
     R_KT: Array  # 1    (3, 3)
     rate: float  # m/s    of the height
-    spin: tuple[float, float, float]  # rad/s    w_KT, torso axes
+    w_KT: tuple[float, float, float]  # rad/s    of the torso, its axes
 
     @classmethod
     def of(cls, value: Array, rate: Array) -> Posture:
@@ -36,8 +36,8 @@ class Posture(NamedTuple):
             return LEVEL
         cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
         R_KT = np.array([[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]])
-        spin = (roll_rate, pitch_rate * cr, -pitch_rate * sr)
-        return cls(False, height, R_KT, height_rate, spin)
+        w_KT = (roll_rate, pitch_rate * cr, -pitch_rate * sr)
+        return cls(False, height, R_KT, height_rate, w_KT)
 
     def turn(self, plane: Any, z: Any) -> tuple[Any, Any]:
         """Returns R_KT p of vectors p = (x + i y, z) of any shape: torso axes to walking axes."""
@@ -56,7 +56,7 @@ class Posture(NamedTuple):
         """Converts positions and velocities of feet from the walking frame to the torso frame."""
         if self.level:
             return feet
-        x, y, z = self.spin
+        x, y, z = self.w_KT
         plane, height = self.to_torso(feet.plane, feet.height)
         # v_T = R_TK (v_K - rate e_z) - w_KT x p_T
         velocity, rise = self.turn_back(feet.velocity, feet.rise - self.rate)

@@ -199,12 +199,13 @@ def _start(
     for axis, name in zip("xy", PLACE, strict=False):
         found[name] += values.get(f"start.{axis}{key}", 0.0)
     if log.has(vector_names("torso.position")):
-        turned = rotation_matrix(np.array([found[name] for name in TURN])) @ offset
-        for name, value in zip(PLACE, turned.tolist(), strict=True):
+        R_WT = rotation_matrix(np.array([found[name] for name in TURN]))
+        offset_W = R_WT @ offset
+        for name, value in zip(PLACE, offset_W.tolist(), strict=True):
             found[name] -= value
     yaw = values.get(f"start.yaw{key}", 0.0)
     if yaw:
-        turn = axis_quaternion(np.array([0.0, 0.0, 1.0]), yaw)
-        old = np.array([found[name] for name in TURN])
-        found |= dict(zip(TURN, quaternion_product(turn, old).tolist(), strict=True))
+        q_VW = axis_quaternion(np.array([0.0, 0.0, 1.0]), yaw)
+        q_WT = np.array([found[name] for name in TURN])
+        found |= dict(zip(TURN, quaternion_product(q_VW, q_WT).tolist(), strict=True))
     return found

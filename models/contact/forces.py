@@ -121,7 +121,8 @@ def contacts_of(robot: Robot, damping: Array, body_damping: Array | None = None)
 def sphere_centre(point: Candidate, body: Array) -> Array:
     """Returns the centre (3,) [m] of a contact's sphere at bodies (19, 13)."""
     carrier = body[point.sphere.body]
-    return np.asarray(carrier[0:3] + rotation_matrix(carrier[3:7]) @ point.sphere.centre)
+    R_WB, centre_B = rotation_matrix(carrier[3:7]), point.sphere.centre
+    return np.asarray(carrier[0:3] + R_WB @ centre_B)
 
 
 def contact_at(

@@ -105,12 +105,12 @@ typedef struct hxModel {
   double torso_mass;       /* kg */
   double torso_inertia[6]; /* kg m2 */
   hxJointModel joint[HX_JOINTS];
-  double point[HX_ROWS][3][HX_SLOTS]; /* m  centres of contacts' spheres from the centre of mass of
-                                       *    tibia or torso */
-  double radius[HX_ROWS];             /* m  those of knee and shank are also of femur and tibia;
-                                       *    those of pairs are sums */
-  double ground_point[3];             /* m  of the plane */
-  double ground_normal[3];            /* 1 */
+  double point_B[HX_ROWS][3][HX_SLOTS]; /* m  centres of contacts' spheres from the centre of mass
+                                         * of tibia or torso */
+  double radius[HX_ROWS];               /* m  those of knee and shank are also of femur and tibia;
+                                         *    those of pairs are sums */
+  double ground_point[3];               /* m  of the plane */
+  double ground_normal[3];              /* 1 */
   /* laws.c: gravity and constraints */
   double gravity[3];  /* m/s2 */
   double alpha, beta; /* 1/s  Baumgarte's (eq. 7) */
@@ -306,16 +306,17 @@ typedef struct hxState {
   double call_evaluations;          /* 1  evaluations before the last call began */
   double supply;                    /* 1  hxCommand.supply of the last call, */
   double duty[HX_JOINTS][HX_SLOTS]; /* 1    and its duty */
-  double locked[HX_JOINTS][HX_SLOTS]; /* 1    1: the joint is locked */
-  double held[HX_JOINTS][HX_SLOTS];   /* rad  where it was locked */
-  hxBus bus;
-  hxFirmware firmware;
-  hxPlantMotion motion;
-  hxContactState contact;
+  double locked[HX_JOINTS][HX_SLOTS];              /* 1    1: the joint is locked (plant/locks.c) */
+  double held[HX_JOINTS][HX_SLOTS];                /* rad  where it was locked */
+  hxBus bus;                                       /* by command/command.c, as the next */
+  hxFirmware firmware;                             /* by command/command.c */
+  hxPlantMotion motion;                            /* by kernels/step.h */
+  hxContactState contact;                          /* by contact_law.c */
   double evaluations, steps, rejected, touchdowns; /* 1  counts since the start */
-  hxMeasured measured;
-  hxMoment moment;       /* end of the last step */
-  hxCompleted completed; /* model exchange: end of the last step */
+  hxMeasured measured;                             /* by measure/ */
+  hxMoment moment; /* by measure/moment.h: end of the last step; hx_copy_state() copies what is
+                    * before it */
+  hxCompleted completed; /* by plant/continuous.c, model exchange: end of the last step */
 } hxState;
 
 struct hxPlant {

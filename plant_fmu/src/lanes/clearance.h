@@ -73,8 +73,8 @@ static inline void leg_chain(const hxModel *model, const hxPlantMotion *motion, 
                tibia = hx_link_vec3(motion, 2, HX_R, slot);
   const hxVec3 point[HX_CHAIN] = {
       hx_add3(femur, hx_mul(R_WF, hx_load_vec3(model->joint[1].point_j, slot))),
-      hx_add3(tibia, hx_mul(R_WS, hx_load_vec3(model->point[HX_KNEE], slot))),
-      hx_add3(tibia, hx_mul(R_WS, hx_load_vec3(model->point[HX_FOOT], slot)))};
+      hx_add3(tibia, hx_mul(R_WS, hx_load_vec3(model->point_B[HX_KNEE], slot))),
+      hx_add3(tibia, hx_mul(R_WS, hx_load_vec3(model->point_B[HX_FOOT], slot)))};
   for (int k = 0; k < HX_CHAIN; ++k) hx_store_vec3(chain[k], slot, point[k]);
 }
 

@@ -191,7 +191,7 @@ HX_INLINE hxContactKinematics hx_contact_kinematics(const hxModel *model,
                                                     const hxKnown *known, int row, int slot,
                                                     int all, hxVec3 r, hxVec3 v,
                                                     const hxBody *body) {
-  const hxVec3 to_centre = hx_mul(body->R_WB, hx_load_vec3(model->point[row], slot));
+  const hxVec3 to_centre = hx_mul(body->R_WB, hx_load_vec3(model->point_B[row], slot));
   const hxGround ground =
       hx_known_or_searched(model, state, known, row, slot, all, hx_add3(r, to_centre));
   return hx_kinematics_over(&ground, model->radius[row], to_centre, v, body);

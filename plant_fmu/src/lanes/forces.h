@@ -48,7 +48,9 @@ static inline hxVec3 joint_bias(const hxModel *model, const hxJointKinematics *k
       kin->sy * rest - w_ij_j.y * speed - twice * (kin->sz * w_ij_j.x - kin->sx * w_ij_j.z);
   const hxReal dz = kin->sz * along + kin->sy * c4 - kin->sx * c5;
   const hxReal dx = (c5 + kin->sx * dz) * inverse_sz, dy = (kin->sy * dz - c4) * inverse_sz;
-  return hx_add3(x, hx_mul(j->R_WB, (hxVec3){dx, dy, dz}));
+  const hxMat3 *R_Wj = &j->R_WB;
+  const hxVec3 d_j = {dx, dy, dz};
+  return hx_add3(x, hx_mul(*R_Wj, d_j));
 }
 
 /* Returns the linear part at c of a motion about the torso's centre of mass. */

@@ -72,13 +72,14 @@ static inline void hx_joint_half_angle(const hxJointModel *model, int slot, hxQu
 /* Computes the axis and the points of a joint from the orientations of parent and child. */
 static inline hxJointKinematics hx_joint_kinematics(const hxJointModel *model, int slot,
                                                     const hxBody *i, const hxBody *j) {
-  const hxVec3 s = hx_mul(i->R_WB, hx_load_vec3(model->s_i, slot));
+  const hxMat3 *R_Wi = &i->R_WB, *R_Wj = &j->R_WB;
+  const hxVec3 s = hx_mul(*R_Wi, hx_load_vec3(model->s_i, slot));
   return (hxJointKinematics){s,
-                             hx_dot(j->R_WB.x, s),
-                             hx_dot(j->R_WB.y, s),
-                             hx_dot(j->R_WB.z, s),
-                             hx_mul(i->R_WB, hx_load_vec3(model->point_i, slot)),
-                             hx_mul(j->R_WB, hx_load_vec3(model->point_j, slot))};
+                             hx_dot(R_Wj->x, s),
+                             hx_dot(R_Wj->y, s),
+                             hx_dot(R_Wj->z, s),
+                             hx_mul(*R_Wi, hx_load_vec3(model->point_i, slot)),
+                             hx_mul(*R_Wj, hx_load_vec3(model->point_j, slot))};
 }
 
 /* Computes Phi = (r_j + s_j^P - r_i - s_i^P, a.s, b.s) and its rate; rows 4 and 5 of the rate are

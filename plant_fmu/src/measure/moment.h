@@ -42,7 +42,7 @@ HX_RARE void further_moments(const hxModel *model, const hxContactState *state,
 /* Returns the depths of a row of contacts of bodies with centres of mass r, on a grid at most. */
 HX_INLINE hxReal depth_bound(const hxModel *model, int row, int slot, hxVec3 r,
                              const hxMat3 *R_WB) {
-  const hxVec3 point = hx_add3(r, hx_mul(*R_WB, hx_load_vec3(model->point[row], slot)));
+  const hxVec3 point = hx_add3(r, hx_mul(*R_WB, hx_load_vec3(model->point_B[row], slot)));
   if (model->terrain_kind == HX_TERRAIN_GRID) return hx_grid_depth_bound(model, row, &point);
   return model->radius[row] - hx_ground(model, NULL, row, slot, 0, point, NULL).distance;
 }

@@ -77,7 +77,7 @@ static void set_tibia_point(hxModel *model, const hxDefinition *d, int leg, int 
   hx_joint_frame(d, leg, HX_JOINTS - 1, q_Lj);
   hx_quaternion_conjugate(q_Lj, q_jL);
   hx_vector_rotate(q_jL, point_L, point_j);
-  for (int i = 0; i < 3; ++i) model->point[row][i][slot] = point_j[i];
+  for (int i = 0; i < 3; ++i) model->point_B[row][i][slot] = point_j[i];
 }
 
 /* Computes the centres of a leg's contacts: the foot at the tibia's tip, the knee at its joint,
@@ -97,7 +97,7 @@ static void compile_tibia_points(hxModel *model, const hxDefinition *d, int leg,
 static void compile_torso_point(hxModel *model, const hxDefinition *d, int slot) {
   for (int i = 0; i < 3; ++i) {
     const double half = d->body.torso_box[i], side = slot >> i & 1 ? half : -half;
-    model->point[HX_TORSO][i][slot] = d->body.torso_centre[i] + side - d->torso.com[i];
+    model->point_B[HX_TORSO][i][slot] = d->body.torso_centre[i] + side - d->torso.com[i];
   }
 }
 

@@ -66,14 +66,15 @@ static inline void hx_sense(const hxControllerInput *input, const hxPosture *pos
                              {2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)},
                              {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)}};
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const double *f = input->foot_force[leg];
-    double seen[3];
-    for (int i = 0; i < 3; ++i) seen[i] = f[0] * R_WT[0][i] + f[1] * R_WT[1][i] + f[2] * R_WT[2][i];
-    hxPlane plane = {seen[0], seen[1]};
-    hx_posture_turn(posture, &plane, &seen[2]);
+    const double *f_W = input->foot_force[leg];
+    double f_T[3];
+    for (int i = 0; i < 3; ++i)
+      f_T[i] = f_W[0] * R_WT[0][i] + f_W[1] * R_WT[1][i] + f_W[2] * R_WT[2][i];
+    hxPlane plane = {f_T[0], f_T[1]};
+    hx_posture_turn(posture, &plane, &f_T[2]);
     force[leg][0] = plane.x;
     force[leg][1] = plane.y;
-    force[leg][2] = seen[2];
+    force[leg][2] = f_T[2];
   }
 }
 

@@ -11,7 +11,7 @@ typedef struct hxPosture {
   double height;     /* m */
   double R_KT[3][3]; /* 1 */
   double rate;       /* m/s    of the height */
-  double spin[3];    /* rad/s  w_KT, torso axes */
+  double w_KT[3];    /* rad/s  of the torso, its axes */
 } hxPosture;
 
 /* Sets the torso's posture: first roll about x, then pitch about y [m, rad, per second]. */
@@ -26,30 +26,32 @@ static inline void hx_posture_of(hxPosture *posture, const double value[3], cons
   for (int i = 0; i < 3; ++i) posture->level &= value[i] == 0.0 && rate[i] == 0.0;
   posture->height = value[0];
   posture->rate = rate[0];
-  posture->spin[0] = rate[1];
-  posture->spin[1] = rate[2] * cr;
-  posture->spin[2] = -rate[2] * sr;
+  posture->w_KT[0] = rate[1];
+  posture->w_KT[1] = rate[2] * cr;
+  posture->w_KT[2] = -rate[2] * sr;
 }
 
 /* Compute R_KT p and R_TK p of p = (plane, z), in place. */
 static inline void hx_posture_turn(const hxPosture *posture, hxPlane *plane, double *z) {
   const double (*R_KT)[3] = posture->R_KT;
-  const double p[3] = {plane->x, plane->y, *z};
-  double q[3];
+  const double p_T[3] = {plane->x, plane->y, *z};
+  double p_K[3];
   if (posture->level) return;
-  for (int i = 0; i < 3; ++i) q[i] = R_KT[i][0] * p[0] + R_KT[i][1] * p[1] + R_KT[i][2] * p[2];
-  *plane = hx_plane(q[0], q[1]);
-  *z = q[2];
+  for (int i = 0; i < 3; ++i)
+    p_K[i] = R_KT[i][0] * p_T[0] + R_KT[i][1] * p_T[1] + R_KT[i][2] * p_T[2];
+  *plane = hx_plane(p_K[0], p_K[1]);
+  *z = p_K[2];
 }
 
 static inline void hx_posture_turn_back(const hxPosture *posture, hxPlane *plane, double *z) {
   const double (*R_KT)[3] = posture->R_KT;
-  const double p[3] = {plane->x, plane->y, *z};
-  double q[3];
+  const double p_K[3] = {plane->x, plane->y, *z};
+  double p_T[3];
   if (posture->level) return;
-  for (int i = 0; i < 3; ++i) q[i] = R_KT[0][i] * p[0] + R_KT[1][i] * p[1] + R_KT[2][i] * p[2];
-  *plane = hx_plane(q[0], q[1]);
-  *z = q[2];
+  for (int i = 0; i < 3; ++i)
+    p_T[i] = R_KT[0][i] * p_K[0] + R_KT[1][i] * p_K[1] + R_KT[2][i] * p_K[2];
+  *plane = hx_plane(p_T[0], p_T[1]);
+  *z = p_T[2];
 }
 
 /* Transforms position and velocity of a foot from the walking frame to the torso frame, in place.
@@ -62,7 +64,7 @@ static inline void hx_posture_to_torso(const hxPosture *posture, hxPlane *plane,
 
 static inline void hx_posture_feet_to_torso(const hxPosture *posture, hxPlane *plane,
                                             double *height, hxPlane *velocity, double *rise) {
-  const double *w = posture->spin;
+  const double *w = posture->w_KT;
   if (posture->level) return;
   hx_posture_to_torso(posture, plane, height);
   /* v_T = R_TK (v_K - rate e_z) - w_KT x p_T */
