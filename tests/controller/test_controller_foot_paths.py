@@ -226,7 +226,7 @@ def test_a_ramp_is_smooth_and_ends_on_its_target_exactly() -> None:
 def test_a_command_that_is_not_a_finite_number_is_refused(name: str, value: Any, said: str) -> None:
     with pytest.raises(HexapodError) as refused:
         BodyCommand(**{name: value})
-    assert str(refused.value).startswith(f"{name}: {said}, expected a finite number; ")
+    assert str(refused.value).startswith(f"{name}: {said}, expected a finite number")
 
 
 def test_while_the_clock_is_held_no_foot_moves_over_the_ground_and_then_it_continues() -> None:
