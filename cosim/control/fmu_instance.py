@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.common.own_process import ProcessEndedError, call_in_pr
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.interface.descriptions import open_description
 from hexapod_cosim.cosim.master.fmu import Fmu
-from hexapod_cosim.cosim.master.fmu_block import FmuVariable, StepError
+from hexapod_cosim.cosim.master.fmu_block import FmuVariable, StepError, type_of_block
 from hexapod_cosim.models import FmuError
 from hexapod_cosim.models.errors import suggestion
 
@@ -131,12 +131,9 @@ class ControllerFmu3:
         return 0 if None in sizes else math.prod(int(size) for size in sizes)
 
     def block(self, names: Sequence[str]) -> Block3:
-        """Returns a block of variables of one type."""
-        kinds = {self.variables[name].type for name in names} or {"Float64"}
-        if len(kinds) != 1:
-            what, fix = "connected variables of several types", "give them one type"
-            raise FmuError(what, got=sorted(kinds), fix=fix, where=str(self.path))
-        return Block3(self, names, kinds.pop(), sum(self._size(name) for name in names))
+        """Returns a block of variables of one type. Raises FmuError for several types."""
+        kind = type_of_block(self.variables, names, "Float64", where=str(self.path))
+        return Block3(self, names, kind, sum(self._size(name) for name in names))
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:
         """Sets parameters by name. Raises FmuError."""

@@ -27,6 +27,7 @@ from hexapod_cosim.cosim.master.fmu_block import (
     FmuVariable,
     StepError,
     parameter_number,
+    type_of_block,
 )
 from hexapod_cosim.models.errors import FmuError, check_type, suggestion
 
@@ -142,12 +143,12 @@ class Fmu(Closing):
     def block(self, names: Sequence[str], buffer: NDArray[Any] | None = None) -> FmuBlock:
         """Returns a block of the named variables, which must all have one type.
 
-        The values stand in `buffer` if one is given. Raises FmuError for an unknown name.
+        The values stand in `buffer` if one is given. Raises FmuError for an unknown name and for
+        several types.
         """
         references = self.references(names)
-        kinds = {self.variables[name].type for name in names} or {"Real"}
-        assert len(kinds) == 1, f"a block of several types: {kinds}"
-        return FmuBlock(self.bind, self.log, names, kinds.pop(), references, buffer)
+        kind = type_of_block(self.variables, names, "Real", where=str(self.path))
+        return FmuBlock(self.bind, self.log, names, kind, references, buffer)
 
     def parameters(self) -> dict[str, float]:
         """Returns the present values of all parameters; enumerations as the number of the item."""

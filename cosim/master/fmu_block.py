@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ctypes
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from numbers import Real
@@ -125,6 +125,17 @@ def parameter_number(variable: Any, value: Any) -> float:
             fix="give a number",
         )
     return float(value)
+
+
+def type_of_block(
+    variables: Mapping[str, Any], names: Iterable[str], empty: str, *, where: str
+) -> str:
+    """Returns the one type of the named variables; `empty` without names. Raises FmuError."""
+    kinds = {variables[name].type for name in names} or {empty}
+    if len(kinds) != 1:
+        what, fix = "connected variables of several types", "give them one type"
+        raise FmuError(what, got=sorted(kinds), fix=fix, where=where)
+    return str(kinds.pop())
 
 
 class FmuLog:

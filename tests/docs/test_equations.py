@@ -190,7 +190,8 @@ def test_the_laws_of_a_file_have_their_names_in_both_languages(file: str, names:
 
 # of files of the repository, as comments and docstrings name them
 NAMED = re.compile(
-    r"(?<![\w/.\-{}])((?:models|plant_fmu|fmi|controller|cosim|extensions|tests|docs|tools|benchmarks)"
+    r"(?<![\w/.\-{}])"
+    r"((?:models|plant_fmu|fmi|controller|cosim|extensions|tests|docs|tools|benchmarks)"
     r"/[\w/]+\.(?:py|c|h|toml|md))\b"
 )
 

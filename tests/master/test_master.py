@@ -293,6 +293,12 @@ def test_columns_are_chosen_by_pattern_and_a_misspelt_one_is_refused() -> None:
 # the real FMU
 
 
+def test_a_block_of_several_types_is_refused(athena_fmu: Path) -> None:
+    message = r"connected variables of several types: got \['Enumeration', 'Real'\]"
+    with Fmu(athena_fmu) as plant, pytest.raises(FmuError, match=message):
+        plant.block(["torso.mass", "friction.law"])
+
+
 def test_a_block_fills_the_buffer_it_is_given(athena_fmu: Path) -> None:
     names = joint_names("angle")
     with Fmu(athena_fmu) as plant:
