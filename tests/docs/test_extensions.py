@@ -141,4 +141,11 @@ def test_without_an_extension_the_core_installs_and_passes_its_tests(
     install = ["-m", "pip", "install", "--quiet", "--no-deps", "--editable", "."]
     subprocess.run([python, *install], cwd=tree, check=True)
     options = ["-q", "-n", "auto", "--dist", "loadfile", f"--deselect=tests/docs/{OWN_FILE}"]
-    subprocess.run([python, "-m", "pytest", *options, *TESTS], cwd=tree, check=True)
+    # behind those of the new environment, which pages.py puts first: the script fmpy
+    path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
+    subprocess.run(
+        [python, "-m", "pytest", *options, *TESTS],
+        cwd=tree,
+        env=os.environ | {"PATH": path},
+        check=True,
+    )
