@@ -27,7 +27,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -154,26 +154,36 @@ def components() -> list[Component]:
 
 
 def cross_compile() -> dict[tuple[str, str], bytes]:
-    """Compiles the binaries of the FMUs and the loop for all targets, by library and target."""
-    libraries = [*map(component_library, components()), loop_library()]
+    """Compiles the binaries of the FMUs and the loops for all targets, by library and target."""
+    libraries = [*map(component_library, components()), *loop_libraries()]
     jobs = [(library, target) for target in TARGETS for library in libraries]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         built = pool.map(lambda job: build_library(*job), jobs)
         return {(job[0].name, job[1]): data for job, data in zip(jobs, built, strict=True)}
 
 
-def loop_library() -> Library:
-    """Returns the co-simulation loops as a library, as cosim/master/CMakeLists.txt builds it."""
-    plant, loops = ROOT / "plant_fmu", [ROOT / "cosim/master", *ROOT.glob("extensions/*/loop")]
+def loop_libraries() -> list[Library]:
+    """Returns the co-simulation loop as a library, and those of extensions, which contain it, as
+    their CMakeLists.txt build them.
+    """
+    core = ROOT / "cosim" / "master"
+    added = sorted(ROOT.glob("extensions/*/loop"))
+    return [
+        _loop_library(LOOP, [core]),
+        *(_loop_library(f"hexapod_{path.parent.name}", [core, path]) for path in added),
+    ]
+
+
+def _loop_library(name: str, loops: Sequence[Path]) -> Library:
+    plant = ROOT / "plant_fmu"
     beside = ROOT.glob("extensions/*/*_fmu/include")  # of an extension's FMU, whose headers it uses
-    files = {}
+    files = {"src/message.c": plant / "src" / "message.c"}
     for include in (plant / "include", *beside, *(loop / "include" for loop in loops)):
         files |= {path.relative_to(include).as_posix(): path for path in include.rglob("*.h")}
     for loop in loops:
         files |= {f"src/{path.name}": path for path in (loop / "src").glob("*.[ch]")}
-    files["src/message.c"] = plant / "src" / "message.c"
     flags = ("-DHX_SHARED", "-pthread")
-    return Library(LOOP, dict(sorted(files.items())), (fmi_headers(),), flags)
+    return Library(name, dict(sorted(files.items())), (fmi_headers(),), flags)
 
 
 def write_wheel(
@@ -185,15 +195,16 @@ def write_wheel(
     """Writes the wheel of a platform: files sorted by name, all with SOURCE_DATE_EPOCH.
 
     base: the files that all wheels have, by name.
-    binaries: by library and target; the loop of the platform's own target is packed, and the
+    binaries: by library and target; the loops of the platform's own target are packed, and the
         FMUs' binaries of all targets.
     """
+    loops = {library.name for library in loop_libraries()}
     (description,) = (name for name in base if name.endswith(".dist-info/WHEEL"))
     members = dict(base)
     members[description] = wheel_description(base[description], platform.tag)
     for (library, target), data in binaries.items():
         suffix = TARGETS[target].suffix
-        if library != LOOP:
+        if library not in loops:
             members[f"{BINARIES}{target}/{library}{suffix}"] = data
         elif target == platform.target:
             members[f"{LIBRARIES}{library}{suffix}"] = data

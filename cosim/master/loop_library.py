@@ -128,18 +128,19 @@ def loop_header() -> Header:
     return Header(*(HEADERS / name for name in ORDER))
 
 
-def load_loop(part: str, size: str, structure: str, header: Header | None = None) -> ct.CDLL:
-    """Returns the library, with its functions declared, if its structures are those of the headers.
+def load_loop(name: str, header: Header, part: str, size: str, structure: str) -> ct.CDLL:
+    """Returns a library, with its functions declared, if its structures are those of its headers.
 
     Args:
-        part: the part of the library: "master", or that of an extension.
+        name: of the library, which contains the co-simulation loop.
+        header: its declarations.
+        part: hx_<part>_layout() returns the version of the structures, HX_<PART>_LAYOUT is it.
         size: the function that returns the size of the structure.
-        structure: name of the structure that holds all others of this part.
-        header: of the extension; by default the library's own.
+        structure: name of the structure that holds all others.
 
     Raises FmuError when the library is missing or has other structures.
     """
-    path, header = shared_library(LOOP), header or loop_header()
+    path = shared_library(name)
     library = header.bind(ct.CDLL(str(path)))
     layout = f"hx_{part}_layout"
     want = header.constants[layout.upper()], ct.sizeof(header.types[structure])
@@ -160,4 +161,4 @@ def load_loop(part: str, size: str, structure: str, header: Header | None = None
 @cache
 def master_library() -> ct.CDLL:
     """Returns the library for runs. Raises FmuError as load_loop()."""
-    return load_loop("master", "hx_master_size", "hxMaster")
+    return load_loop(LOOP, loop_header(), "master", "hx_master_size", "hxMaster")

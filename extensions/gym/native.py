@@ -25,6 +25,7 @@ CALLS = {
     "work_size": "hx_shared_work_size",  # which a foreign FMU does not have, like the next
     "work_use": "hx_shared_work_use",
 }
+LIBRARY = "hexapod_gym"
 PATH = Path(__file__).parent / "loop" / "include" / "hexapod" / "environments.h"
 HEADER = Header(PATH, base=loop_header())
 NativeFmu, NativeDraws = HEADER.types["hxEnvFmu"], HEADER.types["hxEnvDraws"]
@@ -52,7 +53,8 @@ def environments_library() -> ct.CDLL:
 
     Raises FmuError when the library is missing or has another version.
     """
-    return load_loop("environments", "hx_environments_settings_size", "hxEnvSettings", HEADER)
+    size = "hx_environments_settings_size"
+    return load_loop(LIBRARY, HEADER, "environments", size, "hxEnvSettings")
 
 
 @dataclass

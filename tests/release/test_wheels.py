@@ -97,7 +97,7 @@ def test_the_list_of_hashes_is_what_sha256sum_reads(tmp_path: Path) -> None:
 COMPILER = "musl-gcc"
 LIBRARIES = [
     *((component_library(one), "fmi2GetVersion") for one in wheels.components()),
-    (wheels.loop_library(), "hx_master_layout"),
+    *((library, "hx_master_layout") for library in wheels.loop_libraries()),
 ]
 PROGRAM = r"""
 #include <dlfcn.h>

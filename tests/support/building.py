@@ -20,7 +20,7 @@ PRESET = os.environ.get(
 BUILD = ROOT / "build" / PRESET
 TARGETS = ["hexapod", "hexapod_c", "hexapod_controller", "hexapod_controller_c", "hexapod_master"]
 if (ROOT / "extensions" / "gym").is_dir():
-    TARGETS.append("hexapod_policy")
+    TARGETS += ["hexapod_policy", "hexapod_gym"]
 PACKED = ROOT / "build" / "plant" if PRESET == "test" else BUILD / "plant"
 
 

@@ -188,7 +188,7 @@ def test_installed_libraries_need_no_glibc_after_2_14(plant_build: Path) -> None
         "hexapod.so",
         "hexapod_controller.so",
         "hexapod_master.so",
-        *(["hexapod_policy.so"] if has_gym else []),
+        *(["hexapod_policy.so", "hexapod_gym.so"] if has_gym else []),
         "libhexapod_c.so",
         "libhexapod_controller_c.so",
     }
