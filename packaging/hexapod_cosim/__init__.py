@@ -5,12 +5,15 @@
 
 from __future__ import annotations
 
+from os.path import dirname
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from hexapod_cosim.cosim.api import report, simulate
 
 __all__ = ["report", "simulate"]
+# as in the wheel; an editable installation lists the root here, and so its tests and tools, too
+__path__ = [dirname(__file__)]
 
 
 def __getattr__(name: str) -> Any:

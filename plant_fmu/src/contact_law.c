@@ -246,28 +246,28 @@ int hx_contact_switch(const hxModel *model, const hxDepths *depths, hxContactSta
   return touchdowns;
 }
 
-/* Returns whether a row of a leg at one side of a border is the same contact as a row at the other
- * side: the same depth along the same normal. */
-static int is_same(const hxContactMoment *a, const hxContactMoment *b, int leg) {
-  const double slack = 1e-6; /* m and 1; the border is found to 1e-10 m */
+/* Returns the square of the difference of two contacts' normals. */
+static double squared_turn(const hxContactMoment *a, const hxContactMoment *b, int leg) {
   double square = 0.0;
   for (int i = 0; i < 3; ++i) {
     const double d = a->normal[i][leg] - b->normal[i][leg];
     square += d * d;
   }
-  return fabs(a->delta[leg] - b->delta[leg]) < slack && square < slack;
+  return square;
+}
+
+/* Returns whether a row of a leg at one side of a border is the same contact as a row at the other
+ * side: the same depth along the same normal. */
+static int is_same(const hxContactMoment *a, const hxContactMoment *b, int leg) {
+  const double slack = 1e-6; /* m and 1; the border is found to 1e-10 m */
+  return fabs(a->delta[leg] - b->delta[leg]) < slack && squared_turn(a, b, leg) < slack;
 }
 
 /* Returns whether the nearest points of two rows of a leg are so close on the foot that one impact
  * presses both: a step between them is lower than the first is deep. */
 static int is_one_impact(const hxModel *model, const hxContactMoment *a, const hxContactMoment *b,
                          int leg) {
-  double square = 0.0;
-  for (int i = 0; i < 3; ++i) {
-    const double d = a->normal[i][leg] - b->normal[i][leg];
-    square += d * d;
-  }
-  return square * model->radius[HX_FOOT] <= 4.0 * a->delta[leg];
+  return squared_turn(a, b, leg) * model->radius[HX_FOOT] <= 4.0 * a->delta[leg];
 }
 
 void hx_contact_continue_impacts(const hxModel *model, const hxMoment *at,

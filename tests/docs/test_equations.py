@@ -81,7 +81,7 @@ IN_C_WITH_REASON = {
     "exact": "a column of the table of laws, which calls `exact_restitution_chi`",
     "mud": "the mud's case of `virgin_force`",
     "shear_base": "`shear_limit` without the load's part, which lanes add",
-    "supply_share": "the voltage of `supply_power`, whose other part is `duty_share`",
+    "wanted_torque": "the first line of `servo_torque`, before the limits",
     "spin_energy": "the rotors' part of `kinetic_energy`",
     "push_work": "the push's part of the works of a step, which `step_works` leaves out",
     "contact_works": "the loop over feet in `step_works`",

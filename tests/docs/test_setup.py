@@ -71,6 +71,7 @@ HOOKS = (
     "build_editable('dist')",
 )
 STAND_IN = """
+class wheel: pass
 def get_requires_for_build_wheel(settings=None): return ["asked"]
 get_requires_for_build_editable = get_requires_for_build_wheel
 def build_wheel(folder, settings=None, metadata=None): return "built"
@@ -125,6 +126,34 @@ def test_a_toolchain_that_is_chosen_for_cmake_is_not_checked(tmp_path: Path, nam
     assert ask(tmp_path, HOOKS[0], CMAKE_ARGS=f"-D{name}=/some/where").returncode == 0
     question = f"{HOOKS[0][:-1]}{{'cmake.define.{name}': '/some/where'}})"
     assert ask(tmp_path, question).returncode == 0
+
+
+FOLDERS = (
+    *("benchmarks", "controller", "cosim", "docs", "examples", "extensions", "fmi", "models"),
+    *("packaging", "plant_fmu", "tests", "tools"),
+)
+FIND = """
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+root, *names = sys.argv[1:]
+found = {name: find_spec(name) for name in names}
+inside = {name: find_spec("hexapod_cosim." + name) for name in names}
+places = {name: spec.submodule_search_locations for name, spec in found.items() if spec}
+print([name for name in places if f"{root}/{name}" in list(places[name] or ())])
+print([name for name, spec in inside.items() if spec])
+print([place for place in sys.path if Path(place, "hexapod_cosim", "py.typed").is_file()])
+"""
+
+
+def test_the_installed_package_has_the_modules_of_the_wheel_and_no_others(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", FIND, str(ROOT), *FOLDERS]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path, env={})
+    beside, inside, typed = map(ast.literal_eval, done.stdout.splitlines())
+    assert beside == []
+    assert inside == ["controller", "cosim", "examples", "extensions", "models"]
+    assert typed  # for type checkers (PEP 561)
 
 
 # Tests what .ci/run needs and installs: a Python with venv of a version that is read, and pinned

@@ -108,6 +108,42 @@ def test_every_variable_has_a_description_and_every_real_a_unit_and_a_nonzero_no
             assert variable.nominal, variable.name
 
 
+MEMBER = re.compile(
+    r"(?P<opened>struct \{)|\} (?P<closed>\w+);|"
+    r"(?:double|hxIndicators) (?P<names>[^;]+);(?: +/\* +(?P<unit>.*?)(?:  | \*/|$))?",
+    re.MULTILINE,
+)
+
+
+def units_in_header() -> dict[str, list[str]]:
+    """Returns the units in the comments on hxOutput, "m or 1" as two, by the fields' names."""
+    header = (ROOT / "plant_fmu/include/hexapod/hexapod.h").read_text(encoding="utf-8")
+    text = header.partition("typedef struct hxOutput {")[2].partition("} hxOutput;")[0]
+    found: dict[str, list[str]] = {}
+    inner: list[str] = []
+    for member in MEMBER.finditer(text):
+        if member["closed"]:
+            found |= {f"{member['closed']}.{name}": found.pop(name) for name in inner}
+        if not member["names"]:
+            inner = []
+            continue
+        names = re.sub(r"\[[^]]*\]", "", member["names"]).split(", ")
+        units = (member["unit"] or "").replace(" m", ".m").replace(" s", ".s").split(", ")
+        units = units if len(units) == len(names) else units * len(names)
+        found |= {name: unit.split(" or ") for name, unit in zip(names, units, strict=True)}
+        inner += names
+    return found
+
+
+def test_the_comments_on_outputs_in_c_give_the_units_of_the_interface() -> None:
+    units = units_in_header()
+    reals = [one for one in ATHENA.variables if one.type == "Real"]
+    named = {one.field.removeprefix("output."): one.unit for one in reals if "output." in one.field}
+    assert len(named) > 500
+    for field, unit in named.items():
+        assert unit in units[re.sub(r"\[\w+\]", "", field)], field
+
+
 def test_start_values_are_those_of_the_robot() -> None:
     robot = load_robot("athena")
     assert ATHENA.variable("torso.mass").start == robot.torso.mass

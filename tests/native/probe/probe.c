@@ -273,7 +273,7 @@ static void evaluate(hxPlant *plant, const hxInput *input, double age, hxImplici
                      hxWork *work, hxRate *rate) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time - age);
-  hx_command_supply(&command, &plant->model, &plant->state);
+  hx_supply_power(&command, &plant->model, &plant->state);
   hx_dynamics_evaluate(&plant->model, &plant->state.contact, &command, plant->state.time,
                        &plant->state.motion, NULL, implicit, 1, work, rate);
 }
@@ -367,6 +367,17 @@ HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, doubl
   }
 }
 
+/* Copies what the servos' firmware and bus hold, of joints and legs: setpoints, their speeds, times
+ * above the overload limit, shares of the duty limits in the last call, commanded angles. */
+HX_API void hx_probe_firmware(const hxPlant *plant, double out[5][HX_JOINTS][HX_SLOTS]) {
+  const hxState *state = &plant->state;
+  memcpy(out[0], state->firmware.angle, sizeof out[0]);
+  memcpy(out[1], state->firmware.rate, sizeof out[1]);
+  memcpy(out[2], state->firmware.loaded, sizeof out[2]);
+  memcpy(out[3], state->duty, sizeof out[3]);
+  memcpy(out[4], state->bus.angle, sizeof out[4]);
+}
+
 /* Computes dy/dt with the i-th kernel. Returns its name, or NULL when there is none or the
  * processor does not support it. */
 HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
@@ -377,7 +388,7 @@ HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
     if (!hx_kernels[k]) return NULL;
   if (!hx_kernels[i]->is_supported()) return NULL;
   hx_command_from_input(&command, input, plant->state.time);
-  hx_command_supply(&command, &plant->model, &plant->state);
+  hx_supply_power(&command, &plant->model, &plant->state);
   hx_kernels[i]->derivative(&plant->model, &plant->state, &command, 1, plant->scratch, &rate);
   hx_bodies_from_motion(&plant->model, &rate, body);
   return hx_kernels[i]->name;
