@@ -104,15 +104,19 @@ def tanh_creep(friction: Friction, share: Array) -> Array:
     return np.asarray(np.arctanh(np.minimum(share, TANH_LIMIT)) / friction.slope)
 
 
+def friction_direction(friction: Friction, speed: float) -> float:
+    """Returns g of the law [s/m] at a speed [m/s]: f_t = -mu f_n g(|v_t|) v_t (eq. 15)."""
+    return LAWS[friction.law].direction(friction, speed)
+
+
 def friction_drag(friction: Friction, speed: float) -> float:
     """Returns the force over load and slip speed [s/m] of a law without bristles.
 
     It is mu(v) g(v) + viscous (eq. 15, 35) at a slip speed [m/s]; without friction 0.
     """
-    law = LAWS[friction.law]
-    if not law.has_friction:
+    if not friction.has_friction:
         return 0.0
-    along = law.direction(friction, speed)
+    along = friction_direction(friction, speed)
     return float(stribeck_curve(friction, speed)) * along + friction.viscous
 
 
