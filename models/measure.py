@@ -204,7 +204,7 @@ def measure_feet(
     force, stiffness = elastic * factor, 1.5 * K * root * factor
     rises = stiffness * rate / h + np.where(factor > 0.0, elastic * d, 0.0) * second / h**2
     slips = [np.array([slip_velocity(foot) for foot in feet]) for feet in ends]
-    slip = parabola(*slips, mean_slip(robot, before, after, h), NODES)
+    slip = parabola(slips[0], slips[1], mean_slip(robot, before, after, h), NODES)
     slipped = _under_load(robot, h, force, np.linalg.norm(slip, axis=-1))
     return slipped, h * FOOT_WEIGHTS @ force, force.max(axis=0), np.maximum(rises.max(axis=0), 0.0)
 
