@@ -66,9 +66,8 @@ static const double weighed = 0.9;
 /* 1, in thirds of the weight: an awaited foot with more stands */
 static const double carrying_share = 0.2;
 
-enum {
-  HX_TRIPOD_LEGS = 3
-}; /* legs that share the weight in the hardest gait: loads are counted in weight / 3 */
+/* legs that share the weight in the hardest gait: loads are counted in weight / 3 */
+enum { HX_TRIPOD_LEGS = 3 };
 
 /* weight: of the robot [N]; depth: of the ground below the torso's origin in the stance [m]. */
 static inline void hx_force_laws_compile(const hxControllerDefinition *definition, double weight,

@@ -1,4 +1,4 @@
-/* adaptation.h - squeeze and width of the stance by the load of the servos. Python:
+/* load_adaptation.h - squeeze and width of the stance by the load of the servos. Python:
  * controller/sense/load_adaptation.py. */
 #ifndef HX_LOAD_ADAPTATION_H
 #define HX_LOAD_ADAPTATION_H

@@ -13,8 +13,7 @@ typedef struct hxLoadLimitModel {
 
 typedef struct hxLoadLimit {
   double weight_ratio; /* 1    measured over modelled weight */
-  /* N m, largest torque of a joint that carries the model's weight, over the last gait cycle or so
-   */
+  /* N m, largest torque of a joint that carries the model's weight, over about a gait cycle */
   double peak;
   /* 1, factor of the support, below 1 so that no servo exceeds its torque limit */
   double strength;

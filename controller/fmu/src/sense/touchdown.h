@@ -18,8 +18,7 @@ static const double hx_early = 0.002;
 static const double hx_reach_limit = 0.040; /* m, by which a foot is lowered at most */
 static const double reach_speed = 0.08;     /* m/s  downwards */
 static const double hold_limit = 0.030;     /* m, upwards: the largest step height of the robots */
-/* s, delay after the planned touch-down that is tolerated */
-static const double grace = 0.040;
+static const double grace = 0.040; /* s, delay after the planned touch-down that is tolerated */
 /* s, of the gait clock, in which a foot that it waits for begins to move down */
 static const double search_ramp = 0.025;
 static const double return_time = 0.060; /* s, in which an offset decays in the swing */
@@ -71,8 +70,7 @@ static inline void hx_touchdown_step(double period, const int contact[HX_LEGS],
 }
 
 typedef struct hxLandings {
-  /* m, height of each foot's path above its end at the last landing; infinite before the first one
-   */
+  /* m, height of each foot's path above its end at the last landing; infinite before the first */
   double met[HX_LEGS];
   double before[HX_LEGS]; /* m, the same at the landing before; 0 until then */
   int airborne[HX_LEGS];  /* the foot has left the ground in a swing since */
