@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.controller.checks import ControllerError, check_law, check_period
+from hexapod_cosim.controller.checks import ControllerError, check_law, check_period, check_step
 from hexapod_cosim.controller.comply.compliant import Compliant, sense
 from hexapod_cosim.controller.comply.paper import Paper, Step
 from hexapod_cosim.controller.gains import Gains, Parts
@@ -155,6 +155,7 @@ class Controller(Stateful):
         next control begins as after reset(). Raises HexapodError for an unknown law, and then
         changes nothing.
         """
+        check_type(gains, (Gains, NoneType), "Gains, as of load_gains()", where="gains")
         check_law(law)
         self.gains, self.law = gains, law
         self.warnings = gains.warnings(self.robot, period=self.period) if gains else ()
@@ -252,8 +253,9 @@ class Controller(Stateful):
             measurement: sensor values at t; kinematic control does not use them.
 
         Raises:
-            ControllerError: t is not the time of the next step.
+            ControllerError: t is not the time of the next step, or an argument has another type.
         """
+        check_step(t, measurement)
         first = self._start is None
         due = t if self._start is None else self._start + (self._count + 1) * self.period
         if not abs(t - due) <= CLOCK_TOLERANCE * self.period:

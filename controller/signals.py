@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane
+from hexapod_cosim.models.arrays import array_of
 
 DEFAULT_PERIOD = 0.005  # s    between two steps of the controller, and of a co-simulation
 
@@ -25,7 +26,10 @@ def _upright() -> Array:
 
 @dataclass
 class Measurement:
-    """Sensor values of the robot. The arrays belong to the caller, who updates them in place."""
+    """Sensor values of the robot. The arrays belong to the caller, who updates them in place.
+
+    Raises HexapodError for arrays of other shapes.
+    """
 
     angle: Array = field(default_factory=_zeros)  # rad    (6, 3)
     speed: Array = field(default_factory=_zeros)  # rad/s    (6, 3)
@@ -34,6 +38,12 @@ class Measurement:
     quaternion: Array = field(default_factory=_upright)  # 1    (4,) torso to world, w x y z
     # rad/s    (3,) torso, world axes
     angular_velocity: Array = field(default_factory=lambda: np.zeros(3))
+
+    def __post_init__(self) -> None:
+        """Checks the shapes once; a step reads the arrays as they are."""
+        shapes = {"contact": (LEGS,), "quaternion": (4,), "angular_velocity": (3,)}
+        for name, value in vars(self).items():
+            array_of(value, shapes.get(name, (LEGS, 3)), where=name)
 
 
 @dataclass

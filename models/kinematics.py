@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.arrays import Array, array_of
+from hexapod_cosim.models.errors import check_type
 from hexapod_cosim.models.records import Leg, Robot, Torso
 
 LEGS, JOINTS = 6, 3
@@ -156,7 +157,11 @@ def _joint_model(torso: Torso, data: Leg, leg: int, joint: int) -> JointModel:
 def foot_position(leg: Leg, angle: Array) -> Array:
     """Returns the centre (3,) of the foot's sphere in the torso frame [m] at three joint angles
     [rad].
+
+    Raises HexapodError for arguments of other types or shapes.
     """
+    check_type(leg, Leg, "a leg of a Robot", where="leg")
+    angle = array_of(angle, (JOINTS,), where="angle")
     p_T = np.array(leg.hip_position)
     R_TP = axis_rotation(np.array([0.0, 0.0, 1.0]), leg.hip_yaw)
     for link, q in zip(leg.links, angle, strict=True):
@@ -167,8 +172,13 @@ def foot_position(leg: Leg, angle: Array) -> Array:
 
 
 def foot_positions(robot: Robot, angle: Array) -> Array:
-    """Returns the feet's centres (6, 3) in the torso frame [m] at joint angles (6, 3) [rad]."""
-    return np.array([foot_position(leg, q) for leg, q in zip(robot.legs, angle, strict=True)])
+    """Returns the feet's centres (6, 3) in the torso frame [m] at joint angles (6, 3) [rad].
+
+    Raises HexapodError for arguments of other types or shapes.
+    """
+    check_type(robot, Robot, "a Robot, as of load_robot()", where="robot")
+    angles = array_of(angle, (LEGS, JOINTS), where="angle")
+    return np.array([foot_position(leg, q) for leg, q in zip(robot.legs, angles, strict=True)])
 
 
 def body_states(

@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from hexapod_cosim.models.errors import unknown_name
+
 AXIS = re.compile(r"\{(\w+)\}|\[i\]")
 AXES = re.compile(r"\{\w+\}\.|[._]\{\w+\}|\{\w+\}|\[i\]")
 ROOTS = ("gait.", "gains.", "parts.")  # objects besides the robot that parameters are named after
@@ -32,12 +34,15 @@ def with_defaults(
     """Returns an entry of interface.toml with the values that follow from name, causality and unit.
 
     Parameters are fields of nested structures: {leg}.{joint}.mass is leg[leg].link[joint].mass.
-    Others are arrays over their axes: {leg}.foot.force[i] is foot.force[leg][i].
+    Others are arrays over their axes: {leg}.foot.force[i] is foot.force[leg][i]. Raises
+    HexapodError for an unknown unit.
     """
     name = entry["name"]
     defaults: dict[str, Any] = {"size": 3} if "[i]" in name else {}
     if "type" not in entry:
         unit = entry.get("unit", "1")
+        if unit not in units:
+            raise unknown_name("unit", unit, units, where=f"interface.toml: {name}")
         usual = units[unit].get("nominal", 1.0) if isinstance(units[unit], dict) else 1.0
         defaults |= {"unit": unit, "nominal": usual}
     if causality == "parameter":

@@ -17,6 +17,7 @@ from hexapod_cosim.cosim.common.files import (
     claim_folder,
     clear_folder,
     read_json,
+    why_unreadable,
     write_json,
     write_text,
 )
@@ -205,7 +206,7 @@ def damage_reported(folder: Path) -> Iterator[None]:
             where=str(error.filename or folder),
         ) from error
     except Exception as error:  # facts of wrong types fail anywhere in a report
-        got = f"{type(error).__name__}: {error}"
+        got = why_unreadable(error, "result of a run")
         raise _damaged(folder, got, "results as `hexapod` wrote them") from error
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import shutil
+import sys
 import tempfile
 import threading
 from collections.abc import Callable
@@ -70,6 +71,7 @@ class WorkerPool(Executor):
         initialise: Callable[[], None] | None = None,
         scratch: Path | None = None,
     ) -> None:
+        _refuse_unguarded_script()
         self._context = multiprocessing.get_context(START_METHOD)
         self._stop = self._context.Event()
         self._setup = self._stop, scratch, initialise
@@ -115,6 +117,22 @@ class WorkerPool(Executor):
             self._own.process = process
             self._processes.append(process)
         return process
+
+
+def _refuse_unguarded_script() -> None:
+    """Raises HexapodError for a script that every worker process would run again from its start."""
+    main = sys.modules["__main__"]
+    path = getattr(main, "__file__", None)
+    if path is None or main.__spec__ is not None or not Path(path).is_file():
+        return
+    if "__name__" in Path(path).read_text(encoding="utf-8", errors="replace"):
+        return
+    raise HexapodError(
+        "worker processes would run the script again",
+        got=path,
+        expected='calls below `if __name__ == "__main__":`',
+        fix="write this line above them and indent them, or ask for one worker",
+    )
 
 
 def raise_if_stopped(_done: float) -> None:

@@ -86,7 +86,7 @@ def check_servo_faults(scenario: Scenario, robot: Robot) -> None:
 def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
     """Checks that the names in `parameters` are parameters of the robot's FMU.
 
-    `given` are the names set with --set, for the messages. Raises ScenarioError.
+    `given` are the names of settings, as which messages name them. Raises ScenarioError.
     """
     if not scenario.parameters and not scenario.events_of(Tuning):
         return
@@ -101,7 +101,7 @@ def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
     for name, value in scenario.parameters.items():
         if name in known:
             continue
-        where = f"--set {name}" if name in given else f"{scenario.where}: parameters"
+        where = f"{scenario.where}: {name if name in given else 'parameters'}"
         if name in others:
             raise _not_a_parameter(name, others[name], where)
         if name in given:
