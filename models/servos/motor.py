@@ -95,19 +95,10 @@ def electrical_power(servo: Servo, torque: Array, speed: Array) -> Array:
 
 def has_measured_friction(servo: Servo) -> bool:
     """Returns whether the gear has more than Coulomb friction."""
-    return (
-        max(
-            servo.viscous_friction,
-            servo.stribeck_friction,
-            servo.motor_load_friction,
-            servo.external_load_friction,
-            servo.stribeck_motor_load_friction,
-            servo.stribeck_external_load_friction,
-            servo.quadratic_motor_friction,
-            servo.quadratic_external_friction,
-        )
-        > 0.0
-    )
+    loads = servo.motor_load_friction + servo.external_load_friction
+    sticking = servo.stribeck_motor_load_friction + servo.stribeck_external_load_friction
+    quadratic = servo.quadratic_motor_friction + servo.quadratic_external_friction
+    return servo.viscous_friction + servo.stribeck_friction + loads + sticking + quadratic > 0.0
 
 
 def stribeck_share(servo: Servo, speed: Array) -> Array:
@@ -171,10 +162,8 @@ def warm_servo(
     """
     g, k = 1.0 / servo.winding_to_housing, 1.0 / servo.housing_to_air
     a, b = 2.0 * servo.winding_capacity / h, 2.0 * servo.housing_capacity / h
-    of_winding, of_housing = (
-        copper / h + a * winding,
-        gear / h + b * housing + k * servo.air_temperature,
-    )
+    of_winding = copper / h + a * winding
+    of_housing = gear / h + b * housing + k * servo.air_temperature
     determinant = (a + g) * (b + g + k) - g * g
     mean_winding = ((b + g + k) * of_winding + g * of_housing) / determinant
     mean_housing = (g * of_winding + (a + g) * of_housing) / determinant
@@ -195,58 +184,74 @@ def remaining_rating(servo: Servo, winding: Array) -> Array:
     return np.asarray(np.clip((servo.temperature_max - winding) / span, 0.0, 1.0))
 
 
+def motor_duty(
+    servo: Servo, speed: Array, wanted: Array, share: Array, strength: Array | float
+) -> Array:
+    """Returns the duties [1] of motors as of `supply_power` (eq. 53), with shares of their duty
+    limits [1].
+    """
+    back, most = back_emf_damping(servo) * speed, servo.torque_constant * servo.current_max
+    wanted = wanted + back if servo.mode == "torque" else wanted
+    if servo.current_max > 0.0:
+        wanted = np.clip(wanted, back - most, back + most)
+    per_torque, limit = servo.duty_max / stall_torque(servo), strength * servo.duty_max * share
+    idle = (1.0 - strength) * per_torque * back  # without a current
+    return np.asarray(np.clip(wanted * per_torque, idle - limit, idle + limit))
+
+
+def supply_share(servo: Servo, speed: Array, duty: Array) -> float:
+    """Returns the voltage of the supply over that of the servo, at most 1, under these speeds
+    [rad/s] and duties [1] (eq. 53): V = V_0 - R_b sum d (d V - k_t w)/R.
+    """
+    ratio = servo.supply_resistance / servo.resistance
+    back = servo.torque_constant * float(np.sum(duty * speed)) / servo.voltage
+    return min(1.0, (1.0 + ratio * back) / (1.0 + ratio * float(np.sum(duty**2))))
+
+
 def supply_power(
     servo: Servo, speed: Array, wanted: Array, winding: Array, strength: Array | float = 1.0
 ) -> Power:
     """Returns what motors get whose speeds [rad/s], wanted torques [N m] as of `motor_torque` and
-    windings' temperatures [K] have one shape (eq. 53).
-
-    The supply's voltage V solves V = V_0 - R_b sum d (d V - k_t w)/R with the duties d; it is at
-    most V_0.
+    windings' temperatures [K] have one shape.
     """
     share = duty_share(servo, winding)
     if servo.supply_resistance == 0.0 or servo.mode == "kinematic":
         return Power(1.0, share, strength)
-    back_emf = back_emf_damping(servo) * speed
-    wanted = wanted + back_emf if servo.mode == "torque" else wanted
-    if servo.current_max > 0.0:
-        most = servo.torque_constant * servo.current_max
-        wanted = np.clip(wanted, back_emf - most, back_emf + most)
-    per_torque, limit = servo.duty_max / stall_torque(servo), strength * servo.duty_max * share
-    idle = (1.0 - strength) * per_torque * back_emf  # without a current
-    duty = np.clip(wanted * per_torque, idle - limit, idle + limit)
-    ratio = servo.supply_resistance / servo.resistance
-    back = servo.torque_constant * float(np.sum(duty * speed)) / servo.voltage
-    supply = min(1.0, (1.0 + ratio * back) / (1.0 + ratio * float(np.sum(duty**2))))
+    supply = supply_share(servo, speed, motor_duty(servo, speed, wanted, share, strength))
     return Power(supply, supply * share, strength)
 
 
-def moved_goal(servo: Servo, setpoint: Array, goal: Array, h: Array | float) -> Array:
-    """Returns the firmware's setpoint [rad] a time h [s] later: it follows the commanded angle at
-    most at `goal_speed_max` (eq. 57), or at once where that is 0.
+def setpoint_rate(servo: Servo, setpoint: Array, goal: Array, h: Array | float) -> Array:
+    """Returns the speed [rad/s] at which the firmware's setpoint [rad] follows the commanded angle
+    for a time h [s], at most `goal_speed_max` (eq. 57).
     """
-    if not np.any(servo.goal_speed_max):
-        return goal
-    most = servo.goal_speed_max * h
-    return np.asarray(setpoint + np.clip(goal - setpoint, -most, most))
+    return np.asarray(np.clip((goal - setpoint) / h, -servo.goal_speed_max, servo.goal_speed_max))
 
 
-def overload_share(
+def overload_share(servo: Servo, loaded: Array | float) -> Array | float:
+    """Returns the share of the duty limit that the overload protection leaves after a time of
+    `count_overload` [s] (eq. 58).
+    """
+    if servo.overload_time == 0.0:
+        return 1.0
+    left = servo.overload_left / servo.duty_max
+    return np.where(np.abs(loaded) > servo.overload_time, left, 1.0)
+
+
+def count_overload(
     servo: Servo, wanted: Array, loaded: Array | float, h: Array | float
-) -> tuple[Array | float, Array | float]:
-    """Returns the share of the duty limit that the overload protection leaves, and how long the
-    wanted duty has been above `overload_duty` after a further time h [s] (eq. 58).
+) -> Array | float:
+    """Returns how long the wanted duty has been above `overload_duty` after a further time h [s]
+    (eq. 58).
 
     wanted: torque at standstill, as of `motor_torque` [N m]. loaded: the time before [s], < 0 of a
     duty below 0. It begins anew where the wanted duty changes its sign.
     """
     if servo.overload_time == 0.0:
-        return 1.0, loaded
+        return loaded
     above = np.abs(wanted) >= servo.overload_duty * torque_per_volt(servo) * servo.voltage
     side = np.sign(wanted)
-    later = np.where(above, side * (np.maximum(side * loaded, 0.0) + h), 0.0)
-    left = servo.overload_left / servo.duty_max
-    return np.where(np.abs(later) > servo.overload_time, left, 1.0), later
+    return np.where(above, side * (np.maximum(side * loaded, 0.0) + h), 0.0)
 
 
 def held_commands(servo: Servo, time: Array, angle: Array) -> Array:

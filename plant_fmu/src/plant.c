@@ -37,9 +37,9 @@ double hx_largest(double so_far, const void *first, size_t n) {
 
 void hx_plant_command(const hxPlant *plant, const hxInput *input, hxCommand *command) {
   hx_command_from_input(command, input, plant->state.time);
-  hx_bus_command(command, &plant->model, &plant->state);
+  hx_held_commands(command, &plant->model, &plant->state);
   hx_setpoints(command, &plant->model, &plant->state);
-  hx_command_supply(command, &plant->model, &plant->state);
+  hx_supply_power(command, &plant->model, &plant->state);
 }
 
 const char *hx_plant_message(const hxPlant *plant) { return plant->message; }
@@ -130,12 +130,9 @@ void hx_plant_get_torso(const hxPlant *plant, double torso[HX_BODY_STATE]) {
 }
 
 hxStatus hx_plant_set_bodies(hxPlant *plant, const double body[HX_BODIES][HX_BODY_STATE]) {
-  for (int b = 0; b < HX_BODIES; ++b)
-    for (int i = 0; i < HX_BODY_STATE; ++i)
-      if (!isfinite(body[b][i]))
-        return hx_plant_fail(
-            plant, HX_INVALID_ARGUMENT,
-            "body state: got a number that is not finite, expected finite numbers");
+  if (!isfinite(hx_largest(0.0, body, HX_BODIES * HX_BODY_STATE)))
+    return hx_plant_fail(plant, HX_INVALID_ARGUMENT,
+                         "body state: got a number that is not finite, expected finite numbers");
   hx_motion_from_bodies(&plant->model, body, &plant->state.motion);
   hx_kernel()->start(&plant->model, plant->state.time, &plant->state, plant->scratch);
   return HX_OK;

@@ -1,5 +1,5 @@
-"""The bench of one servo: laws of its firmware, the plant in C as its twin, readers of logs, and a
-fit that finds the servo which made the logs.
+"""The bench of one servo: the plant in C as its twin, readers of logs, and a fit that finds the
+servo which made the logs.
 """
 
 from __future__ import annotations
@@ -28,19 +28,8 @@ from hexapod_cosim.extensions.identify.fitting.least_squares import huber
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.records import Servo
-from hexapod_cosim.models.servos.motor import (
-    FULL,
-    Power,
-    motor_current,
-    motor_torque,
-    moved_goal,
-    no_load_speed,
-    overload_share,
-    stall_torque,
-)
 from hexapod_cosim.models.servos.presets import measured_servo
 
-SERVO = measured_servo("xl330_m4").servo
 ROD = Rod(mass=0.3, rod=0.02, length=0.1)
 FIRMWARE: dict[str, dict[str, float]] = {
     "current": {"current_max": 0.9},
@@ -51,48 +40,6 @@ FIRMWARE: dict[str, dict[str, float]] = {
         "overload_time": 0.3, "overload_duty": 0.4, "overload_left": 0.3,
     },
 }  # fmt: skip
-
-
-def test_the_current_stays_within_its_limit_where_the_duty_can_do_it() -> None:
-    servo = replace(SERVO, current_max=0.4)
-    most, wanted = no_load_speed(servo), np.linspace(-9.0, 9.0, 37) * stall_torque(servo)
-    for speed in (0.0, 0.5 * most, -most):
-        torque = motor_torque(servo, np.full(37, speed), wanted)
-        assert np.abs(motor_current(servo, torque)).max() == pytest.approx(0.4, rel=1e-12)
-    # turned faster than without a load, the motor brakes at full duty
-    fast = motor_torque(servo, np.array([3.0 * most]), np.array([9.0]) * stall_torque(servo))
-    assert fast == pytest.approx(-2.0 * stall_torque(servo), rel=1e-12)
-    free = motor_torque(SERVO, np.array([1.0]), wanted[20:21])
-    loose = replace(SERVO, current_max=1e3)
-    assert motor_torque(loose, np.array([1.0]), wanted[20:21]).tobytes() == free.tobytes()
-
-
-def test_a_motor_that_is_off_has_no_torque_and_a_driven_one_brakes() -> None:
-    speed = np.array([2.0])
-    assert motor_torque(SERVO, speed, np.zeros(1), Power(1.0, 1.0, 0.0)) == 0.0
-    damping = SERVO.torque_constant**2 / SERVO.resistance
-    assert motor_torque(SERVO, speed, np.zeros(1), FULL) == pytest.approx(-2.0 * damping)
-
-
-def test_a_setpoint_reaches_its_goal_after_the_way_over_the_speed() -> None:
-    servo, setpoint = replace(SERVO, goal_speed_max=2.0), np.zeros(2)
-    goal = np.array([0.5, -0.1])
-    for _ in range(24):
-        setpoint = moved_goal(servo, setpoint, goal, 0.01)
-    assert setpoint == pytest.approx([0.48, -0.1], abs=1e-12)
-    assert moved_goal(servo, setpoint, goal, 0.01) == pytest.approx(goal, abs=1e-12)
-    assert moved_goal(SERVO, np.zeros(2), goal, 0.01) is goal
-
-
-def test_overload_leaves_its_share_after_its_time_until_the_duty_falls_or_turns() -> None:
-    servo = replace(SERVO, overload_time=0.1, overload_duty=0.8, overload_left=0.2)
-    loaded: Any = np.zeros(1)
-    full = stall_torque(servo) / servo.duty_max
-    shares = []
-    for wanted in [0.9] * 12 + [-0.9, 0.7]:
-        share, loaded = overload_share(servo, np.array([wanted * full]), loaded, 0.01)
-        shares.append(float(np.asarray(share)[0]))
-    assert shares == pytest.approx([1.0] * 10 + [0.2] * 2 + [1.0] * 2)
 
 
 def made_log(

@@ -92,6 +92,24 @@ def live(browser: Any, address: str) -> Iterator[LivePage]:
     page.close()
 
 
+def test_on_a_phone_all_fits_its_width_and_a_button_turns_the_robot(
+    browser: Any, address: str
+) -> None:
+    phone = LivePage(
+        browser, address, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True
+    )
+    assert phone.page.evaluate("document.documentElement.scrollWidth") <= 390
+    phone.place()
+    phone.page.evaluate("scrollTo(0, 0)")
+    phone.page.locator("[data-key=KeyA]").hover()
+    phone.page.mouse.down()
+    phone.until(f"{HEADING} > 0.1")
+    phone.page.mouse.up()
+    phone.until("frame.command[2] === 0")
+    assert phone.errors == []
+    phone.close()
+
+
 def test_the_page_opens_without_errors_and_asks_for_nothing_else(
     live: LivePage, address: str
 ) -> None:
@@ -201,21 +219,3 @@ def test_both_themes_are_drawn(live: LivePage) -> None:
         live.page.keyboard.press("t")
         colours.append(live.page.evaluate("getComputedStyle(document.body).backgroundColor"))
     assert len(set(colours)) == 2
-
-
-def test_on_a_phone_all_fits_its_width_and_a_button_turns_the_robot(
-    browser: Any, address: str
-) -> None:
-    phone = LivePage(
-        browser, address, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True
-    )
-    assert phone.page.evaluate("document.documentElement.scrollWidth") <= 390
-    phone.place()
-    phone.page.evaluate("scrollTo(0, 0)")
-    phone.page.locator("[data-key=KeyA]").hover()
-    phone.page.mouse.down()
-    phone.until(f"{HEADING} > 0.1")
-    phone.page.mouse.up()
-    phone.until("frame.command[2] === 0")
-    assert phone.errors == []
-    phone.close()

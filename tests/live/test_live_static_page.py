@@ -42,7 +42,9 @@ def opened(browser: Any, written: Path, **options: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def page(browser: Any, written: Path) -> Any:
-    return opened(browser, written)
+    """Of few pixels, because they are drawn without a graphics card."""
+    small = {"width": 640, "height": 400}
+    return opened(browser, written, viewport=small, device_scale_factor=0.5)
 
 
 @contextmanager
@@ -85,6 +87,50 @@ def test_what_has_no_effect_on_the_page_is_refused(
     assert not page.exists()
 
 
+PHONE = {
+    "viewport": {"width": 390, "height": 844},
+    "has_touch": True,
+    "is_mobile": True,
+    "device_scale_factor": 0.5,  # fewer pixels, because they are drawn without a graphics card
+    "color_scheme": "dark",
+}
+
+
+@pytest.fixture(scope="module")
+def phone(browser: Any, written: Path) -> Any:
+    return opened(browser, written, **PHONE)
+
+
+def test_on_a_phone_all_fits_its_width_and_a_button_walks_the_robot(phone: Any) -> None:
+    assert phone.evaluate("document.documentElement.scrollWidth") == 390
+    for name in ("controls", "gaits", "friction"):
+        box = phone.locator(f"#{name}").bounding_box()
+        assert box["x"] >= 0.0
+        assert box["x"] + box["width"] <= 390.0
+    colour = phone.evaluate("getComputedStyle(document.body).backgroundColor")
+    brightness = sum(int(part) for part in re.findall(r"\d+", colour)[:3]) / 3
+    assert brightness < 60
+    phone.evaluate("scrollTo(0, 0)")
+    phone.locator("[data-key=KeyW]").hover()
+    phone.mouse.down()
+    phone.wait_for_function(f"{FRAME}.position[0] > 0.02")
+    phone.mouse.up()
+    phone.wait_for_function(f"{FRAME}.command[0] === 0")
+    assert problems(phone) == []
+
+
+def test_on_a_phone_on_its_side_the_robot_stands_beside_the_pad(phone: Any) -> None:
+    phone.set_viewport_size({"width": 740, "height": 360})
+    assert phone.evaluate("document.documentElement.scrollWidth") == 740
+    stage, pad = (phone.locator(name).bounding_box() for name in ("#stage", ".pad"))
+    assert stage["x"] + stage["width"] <= pad["x"]
+    assert max(box["y"] + box["height"] for box in (stage, pad)) <= 360.0
+    # what the controls are, and which one walks, is there from the start
+    assert phone.inner_text("#control-about").startswith("Plays the planned joint angles")
+    assert phone.inner_text("#controls [aria-pressed=true]") == "kinematic"
+    phone.context.close()  # it is not drawn beside the page of the next tests
+
+
 def test_the_robot_walks_and_turns_by_keys_without_a_network(page: Any) -> None:
     with walking(page):
         page.wait_for_function(f"{FRAME}.position[0] > 0.03")
@@ -116,51 +162,6 @@ def test_the_control_changes_while_the_robot_walks(page: Any) -> None:
             page.wait_for_function(f"{FRAME}.position[0] > {begin} + 0.02")
         assert page.evaluate("window.slowest") > 0.0  # the command has held all the time
     assert problems(page) == []
-
-
-PHONE = {
-    "viewport": {"width": 390, "height": 844},
-    "has_touch": True,
-    "is_mobile": True,
-    "device_scale_factor": 0.5,  # fewer pixels, because they are drawn without a graphics card
-    "color_scheme": "dark",
-}
-
-
-def test_on_a_phone_all_fits_its_width_and_a_button_walks_the_robot(
-    browser: Any, written: Path
-) -> None:
-    phone = opened(browser, written, **PHONE)
-    assert phone.evaluate("document.documentElement.scrollWidth") == 390
-    for name in ("controls", "gaits", "friction"):
-        box = phone.locator(f"#{name}").bounding_box()
-        assert box["x"] >= 0.0
-        assert box["x"] + box["width"] <= 390.0
-    colour = phone.evaluate("getComputedStyle(document.body).backgroundColor")
-    brightness = sum(int(part) for part in re.findall(r"\d+", colour)[:3]) / 3
-    assert brightness < 60
-    phone.evaluate("scrollTo(0, 0)")
-    phone.locator("[data-key=KeyW]").hover()
-    phone.mouse.down()
-    phone.wait_for_function(f"{FRAME}.position[0] > 0.02")
-    phone.mouse.up()
-    phone.wait_for_function(f"{FRAME}.command[0] === 0")
-    assert problems(phone) == []
-    phone.context.close()
-
-
-def test_on_a_telephone_on_its_side_the_robot_stands_beside_the_pad(
-    browser: Any, written: Path
-) -> None:
-    phone = opened(browser, written, **{**PHONE, "viewport": {"width": 740, "height": 360}})
-    assert phone.evaluate("document.documentElement.scrollWidth") == 740
-    stage, pad = (phone.locator(name).bounding_box() for name in ("#stage", ".pad"))
-    assert stage["x"] + stage["width"] <= pad["x"]
-    assert max(box["y"] + box["height"] for box in (stage, pad)) <= 360.0
-    # what the controls are, and which one walks, is there from the start
-    assert phone.inner_text("#control-about").startswith("Plays the planned joint angles")
-    assert phone.inner_text("#controls [aria-pressed=true]") == "kinematic"
-    phone.context.close()
 
 
 def test_control_friction_and_place_answer(page: Any) -> None:

@@ -61,9 +61,9 @@ def with_servo(robot: Robot, name: str, **settings: Any) -> Robot:
 
 
 @pytest.mark.parametrize("name", ["mx64_m1", "mx64_m2", "mx64_m4", "mx106_m6"])
-@pytest.mark.parametrize("mode", ["position", "torque"])
-def test_the_plants_servos_are_the_twins(core: ct.CDLL, name: str, mode: str) -> None:
-    robot = with_servo(load_robot("athena"), name, mode=mode, kd=0.3)
+@pytest.mark.parametrize(("mode", "most"), [("position", 0.0), ("position", 1.0), ("torque", 1.0)])
+def test_the_plants_servos_are_the_twins(core: ct.CDLL, name: str, mode: str, most: float) -> None:
+    robot = with_servo(load_robot("athena"), name, mode=mode, kd=0.3, current_max=most)
     plant, servo, rng = Plant(core, robot), robot.servo, np.random.default_rng(1)
     clipped = 0
     for _ in range(60):

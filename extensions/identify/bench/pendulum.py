@@ -20,10 +20,11 @@ from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.servos.motor import (
     Power,
     back_emf_damping,
+    count_overload,
     friction_budget,
-    moved_goal,
     overload_share,
     position_gain,
+    setpoint_rate,
 )
 
 GRAVITY = 9.80665  # m/s2
@@ -133,11 +134,12 @@ class _State:
         self, servo: Servo, bench: Bench, h: Array, goal: Array, supply: Array, on: Array
     ) -> Array:
         """Advances by h [s] with semi-implicit Euler; returns the duty."""
-        self.setpoint = moved_goal(servo, self.setpoint, goal, h)
-        share, self.loaded = overload_share(
-            servo, servo.kp * (self.setpoint - self.angle), self.loaded, h
-        )
-        power = Power(supply, supply * share, on)
+        if np.any(servo.goal_speed_max):
+            goal = self.setpoint + h * setpoint_rate(servo, self.setpoint, goal, h)
+        self.setpoint = goal
+        wanted = servo.kp * (self.setpoint - self.angle)
+        self.loaded = count_overload(servo, wanted, self.loaded, h)
+        power = Power(supply, supply * overload_share(servo, self.loaded), on)
         rest = np.zeros(())  # commands of speed and torque
         motor = servo_torque(servo, self.angle, self.speed, self.setpoint, rest, rest, power=power)
         external = -bench.weight * np.sin(self.angle)

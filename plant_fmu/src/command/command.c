@@ -24,52 +24,64 @@ void hx_command_from_input(hxCommand *command, const hxInput *input, double time
   command->time = time;
 }
 
-/* Returns the duty of a leg's motor under a command at the last moment, and in *speed the speed of
- * its joint. */
-static double motor_duty(const hxCommand *command, const hxModel *model, const hxState *state,
-                         int joint, int leg, double *speed) {
-  const double angle = state->moment.angle[joint][leg], w = state->moment.speed[joint][leg];
-  const double share = 1.0 - command->weakness[joint][leg],
+/* Returns the torque that the servo's law wants at the last moment, N m (eq. 48). */
+static double wanted_torque(const hxCommand *command, const hxModel *model, const hxMoment *at,
+                            int joint, int slot) {
+  return model->kp * (command->angle[joint][slot] - at->angle[joint][slot]) +
+         model->kd * (command->speed[joint][slot] - at->speed[joint][slot]) +
+         command->torque[joint][slot];
+}
+
+/* Returns the share of the duty limit that is left at the temperature of a winding, K (eq. 52). */
+static double duty_share(const hxHeat *heat, double winding) {
+  const double per_kelvin = 1.0 / (heat->max - heat->derate);
+  return heat->winding > 0.0 ? fmax(0.0, fmin(1.0, (heat->max - winding) * per_kelvin)) : 1.0;
+}
+
+/* Returns the share of the duty limit that the overload protection leaves after a time of the duty
+ * above the overload limit, s (eq. 58). */
+static double overload_share(const hxModel *model, double loaded) {
+  const int limited = model->overload_time > 0.0 && fabs(loaded) > model->overload_time;
+  return limited ? model->overload_left : 1.0;
+}
+
+/* Returns the duty of a motor under a command at the last moment, as far as limits of duty and
+ * current allow it (eq. 53). */
+static double motor_duty(const hxCommand *command, const hxModel *model, const hxMoment *at,
+                         int joint, int slot) {
+  const double w = at->speed[joint][slot], back = model->back_emf * w, most = model->current_torque;
+  const double strength = 1.0 - command->weakness[joint][slot],
                per_torque = model->duty_max / model->stall_torque;
-  const double limit = share * model->duty_max * command->duty[joint][leg];
-  const double free = (1.0 - share) * per_torque * model->back_emf * w; /* without a current */
-  double wanted = model->kp * (command->angle[joint][leg] - angle) +
-                  model->kd * (command->speed[joint][leg] - w) + command->torque[joint][leg];
-  if (model->servo_mode == HX_SERVO_TORQUE) wanted += model->back_emf * w;
-  *speed = w;
-  const double most = model->current_torque, back = model->back_emf * w;
+  const double limit = strength * model->duty_max * command->duty[joint][slot];
+  const double idle = (1.0 - strength) * per_torque * model->back_emf * w; /* without a current */
+  double wanted = wanted_torque(command, model, at, joint, slot);
+  if (model->servo_mode == HX_SERVO_TORQUE) wanted += back;
   wanted = fmax(back - most, fmin(back + most, wanted));
-  return fmax(free - limit, fmin(free + limit, wanted * model->duty_max / model->stall_torque));
+  return fmax(idle - limit, fmin(idle + limit, wanted * model->duty_max / model->stall_torque));
 }
 
 /* Returns the voltage of the supply over servo.voltage, at most 1 (eq. 53): with the duties d, the
  * current is the sum of d (d V - k_t w)/R. */
-static double supply_share(const hxCommand *command, const hxModel *model, const hxState *state) {
+static double supply_share(const hxCommand *command, const hxModel *model, const hxMoment *at) {
   const double ratio = model->supply_resistance / model->resistance;
-  double squares = 0.0, back = 0.0, speed;
+  double squares = 0.0, back = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      const double duty = motor_duty(command, model, state, joint, leg, &speed);
-      squares += duty * duty, back += duty * speed;
+      const double duty = motor_duty(command, model, at, joint, leg);
+      squares += duty * duty, back += duty * at->speed[joint][leg];
     }
   const double emf = model->torque_constant * back / model->voltage;
   return fmin(1.0, (1.0 + ratio * emf) / (1.0 + ratio * squares));
 }
 
-void hx_command_supply(hxCommand *command, const hxModel *model, const hxState *state) {
-  const hxHeat *heat = &model->heat;
-  const double per_kelvin = 1.0 / (heat->max - heat->derate);
+void hx_supply_power(hxCommand *command, const hxModel *model, const hxState *state) {
   for (int joint = 0; joint < HX_JOINTS; ++joint)
-    for (int slot = 0; slot < HX_SLOTS; ++slot) {
-      const double left = (heat->max - state->measured.winding[joint][slot]) * per_kelvin;
-      command->duty[joint][slot] = heat->winding > 0.0 ? fmax(0.0, fmin(1.0, left)) : 1.0;
-      if (model->overload_time > 0.0 &&
-          fabs(state->firmware.loaded[joint][slot]) > model->overload_time)
-        command->duty[joint][slot] *= model->overload_left;
-    }
+    for (int slot = 0; slot < HX_SLOTS; ++slot)
+      command->duty[joint][slot] = duty_share(&model->heat, state->measured.winding[joint][slot]) *
+                                   overload_share(model, state->firmware.loaded[joint][slot]);
   const int sags = model->supply_resistance > 0.0 && model->servo_drive == HX_DRIVE_MOTOR &&
                    model->servo_mode != HX_SERVO_KINEMATIC;
-  command->supply = sags ? supply_share(command, model, state) : 1.0;
+  command->supply = sags ? supply_share(command, model, &state->moment) : 1.0;
 }
 
 /* ------------------------------------------------------------------------------------------- bus
@@ -87,12 +99,10 @@ static double next_sending(const hxModel *model, const hxState *state) {
                                  : state->time;
 }
 
-void hx_bus_command(hxCommand *command, const hxModel *model, const hxState *state) {
+void hx_held_commands(hxCommand *command, const hxModel *model, const hxState *state) {
   if (!hx_has_bus(model)) return;
   if (state->time < next_sending(model, state) - bus_margin) {
-    memcpy(command->angle, state->bus.angle, sizeof command->angle);
-    memcpy(command->speed, state->bus.speed, sizeof command->speed);
-    memcpy(command->torque, state->bus.torque, sizeof command->torque);
+    memcpy(command, &state->bus, HX_JOINT_COMMANDS);
     return;
   }
   const double step = model->command_step;
@@ -103,10 +113,8 @@ void hx_bus_command(hxCommand *command, const hxModel *model, const hxState *sta
 }
 
 void hx_bus_send(hxCommand *command, const hxModel *model, hxState *state) {
-  hx_bus_command(command, model, state);
-  memcpy(state->bus.angle, command->angle, sizeof command->angle);
-  memcpy(state->bus.speed, command->speed, sizeof command->speed);
-  memcpy(state->bus.torque, command->torque, sizeof command->torque);
+  hx_held_commands(command, model, state);
+  memcpy(&state->bus, command, HX_JOINT_COMMANDS);
   if (model->bus_period > 0.0 && state->time >= next_sending(model, state) - bus_margin)
     state->bus.sent =
         floor((state->time + bus_margin - state->bus.start) / model->bus_period) + 1.0;
@@ -121,43 +129,41 @@ double hx_bus_end(const hxModel *model, const hxState *state, double t_end) {
 /* ------------------------------------------------------------------------------------- firmware
  */
 
+/* Returns the speed, rad/s, at which a setpoint follows a commanded angle for a time h, s
+ * (eq. 57). */
+static double setpoint_rate(const hxModel *model, double setpoint, double goal, double h) {
+  const double most = model->goal_speed;
+  return h > 0.0 ? fmax(-most, fmin(most, (goal - setpoint) / h)) : 0.0;
+}
+
 void hx_setpoints(hxCommand *command, const hxModel *model, const hxState *state) {
   const hxFirmware *firmware = &state->firmware;
   if (!(model->goal_speed > 0.0)) return;
-  for (int i = 0; i < HX_JOINTS * HX_SLOTS; ++i)
-    command->angle[i / HX_SLOTS][i % HX_SLOTS] =
-        firmware->angle[i / HX_SLOTS][i % HX_SLOTS] +
-        firmware->rate[i / HX_SLOTS][i % HX_SLOTS] * (state->time - firmware->time);
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int slot = 0; slot < HX_SLOTS; ++slot)
+      command->angle[joint][slot] = firmware->angle[joint][slot] +
+                                    firmware->rate[joint][slot] * (state->time - firmware->time);
 }
 
-void hx_follow_goals(hxCommand *command, const hxModel *model, hxState *state, double t_end,
-                     hxCommand *ramp) {
+void hx_follow_goals(const hxCommand *goal, const hxModel *model, hxState *state, double t_end) {
   hxFirmware *firmware = &state->firmware;
-  const double most = model->goal_speed, h = t_end - state->time;
-  hxCommand now = *command;
-  if (!(most > 0.0)) return;
-  hx_setpoints(&now, model, state);
-  for (int i = 0; i < HX_JOINTS * HX_SLOTS; ++i) {
-    const int joint = i / HX_SLOTS, slot = i % HX_SLOTS;
-    const double left = command->angle[joint][slot] - now.angle[joint][slot];
-    const double rate = h > 0.0 ? fmax(-most, fmin(most, left / h)) : 0.0;
-    firmware->rate[joint][slot] = ramp->angle[joint][slot] = rate;
-  }
-  memcpy(command->angle, now.angle, sizeof command->angle);
-  memcpy(firmware->angle, now.angle, sizeof firmware->angle);
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int slot = 0; slot < HX_SLOTS; ++slot) {
+      double *setpoint = &firmware->angle[joint][slot], *rate = &firmware->rate[joint][slot];
+      *setpoint += *rate * (state->time - firmware->time);
+      *rate = setpoint_rate(model, *setpoint, goal->angle[joint][slot], t_end - state->time);
+    }
   firmware->time = state->time;
 }
 
 void hx_count_overload(const hxCommand *command, const hxModel *model, hxState *state, double h) {
   if (!(model->overload_time > 0.0)) return;
-  for (int i = 0; i < HX_JOINTS * HX_SLOTS; ++i) {
-    const int joint = i / HX_SLOTS, slot = i % HX_SLOTS;
-    const double wanted =
-        model->kp * (command->angle[joint][slot] - state->moment.angle[joint][slot]) +
-        model->kd * (command->speed[joint][slot] - state->moment.speed[joint][slot]) +
-        command->torque[joint][slot];
-    double *loaded = &state->firmware.loaded[joint][slot];
-    const double side = copysign(1.0, wanted);
-    *loaded = fabs(wanted) >= model->overload_torque ? side * (fmax(side * *loaded, 0.0) + h) : 0.0;
-  }
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int slot = 0; slot < HX_SLOTS; ++slot) {
+      const double wanted = wanted_torque(command, model, &state->moment, joint, slot);
+      double *loaded = &state->firmware.loaded[joint][slot];
+      const double side = copysign(1.0, wanted);
+      *loaded =
+          fabs(wanted) >= model->overload_torque ? side * (fmax(side * *loaded, 0.0) + h) : 0.0;
+    }
 }

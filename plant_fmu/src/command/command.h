@@ -14,7 +14,7 @@ int hx_has_bus(const hxModel *model);
 
 /* Replaces the commands of joints by those that the servos have at the present time: rounded ones
  * where the bus transmits now, else those that they hold. */
-void hx_bus_command(hxCommand *command, const hxModel *model, const hxState *state);
+void hx_held_commands(hxCommand *command, const hxModel *model, const hxState *state);
 
 /* Does the same, and keeps commands that the bus transmits now. */
 void hx_bus_send(hxCommand *command, const hxModel *model, hxState *state);
@@ -22,13 +22,12 @@ void hx_bus_send(hxCommand *command, const hxModel *model, hxState *state);
 /* Returns the time of the next transmission if it is before t_end, else t_end, s. */
 double hx_bus_end(const hxModel *model, const hxState *state, double t_end);
 
-/* Replaces commanded angles by the firmware's setpoints at the present time (eq. 57). */
+/* Replaces commanded angles by the firmware's setpoints at the present time. */
 void hx_setpoints(hxCommand *command, const hxModel *model, const hxState *state);
 
-/* Does the same at the begin of a command until t_end, s, and sets the speeds at which the
- * setpoints follow the commanded angles in *ramp. */
-void hx_follow_goals(hxCommand *command, const hxModel *model, hxState *state, double t_end,
-                     hxCommand *ramp);
+/* Moves the setpoints to the present time, and sets the speeds at which they follow the commanded
+ * angles until t_end, s. */
+void hx_follow_goals(const hxCommand *goal, const hxModel *model, hxState *state, double t_end);
 
 /* Counts a time, s, of the duties under a command at the last moment that are above the overload
  * limit (eq. 58). */
@@ -37,7 +36,7 @@ void hx_count_overload(const hxCommand *command, const hxModel *model, hxState *
 /* Sets what the motors get from their supply in a command: the shares of their duty limits by the
  * temperatures of their windings (eq. 52) and the overload protection (eq. 58), and the supply's
  * voltage under the currents of this command at the last moment (eq. 53). */
-void hx_command_supply(hxCommand *command, const hxModel *model, const hxState *state);
+void hx_supply_power(hxCommand *command, const hxModel *model, const hxState *state);
 
 HX_HIDDEN_END
 

@@ -28,7 +28,7 @@ static double input_fingerprint(const hxInput *input) {
 static void supply_motors(hxPlant *plant, int resumes, hxCommand *command) {
   hxState *state = &plant->state;
   if (!resumes) {
-    hx_command_supply(command, &plant->model, state);
+    hx_supply_power(command, &plant->model, state);
     state->supply = command->supply;
     memcpy(state->duty, command->duty, sizeof state->duty);
   }
@@ -63,10 +63,7 @@ static void follow_goals(hxPlant *plant, int resumes, double t_end, hxCommand *c
                          hxCommand *ramp) {
   const hxFirmware *firmware = &plant->state.firmware;
   if (!(plant->model.goal_speed > 0.0)) return;
-  if (!resumes) {
-    hx_follow_goals(command, &plant->model, &plant->state, t_end, ramp);
-    return;
-  }
+  if (!resumes) hx_follow_goals(command, &plant->model, &plant->state, t_end);
   memcpy(command->angle, firmware->angle, sizeof command->angle);
   memcpy(ramp->angle, firmware->rate, sizeof ramp->angle);
 }
@@ -85,9 +82,7 @@ static double part_command(hxPlant *plant, const hxStepCall *call, int resumes, 
     for (int i = 0; call->ramp && i < SIZE; ++i) to[i] += elapsed * rate[i];
     command->time = time;
     hx_bus_send(command, &plant->model, state);
-    memset(ramp->angle, 0, sizeof ramp->angle);
-    memset(ramp->speed, 0, sizeof ramp->speed);
-    memset(ramp->torque, 0, sizeof ramp->torque);
+    memset(ramp, 0, HX_JOINT_COMMANDS);
   }
   const double end = hx_bus_end(&plant->model, state, t_end);
   follow_goals(plant, resumes, end, command, ramp);

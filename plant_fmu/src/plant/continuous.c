@@ -69,7 +69,7 @@ void hx_plant_completed_step(hxPlant *plant, const hxInput *input) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time);
   if (hx_has_bus(&plant->model)) hx_bus_send(&command, &plant->model, &plant->state);
-  hx_command_supply(&command, &plant->model, &plant->state);
+  hx_supply_power(&command, &plant->model, &plant->state);
   hx_kernel()->measure(&plant->model, &command, &plant->state, plant->scratch);
   switch_walls(plant);
 }

@@ -41,7 +41,7 @@ static void add_numbers(hxConstants *constants, double share) {
 static void add_supply(const hxPlant *plant, double share, hxConstants *constants,
                        hxCommand *d_command) {
   hxCommand *command = &constants->command;
-  hx_command_supply(command, &constants->model, &plant->state);
+  hx_supply_power(command, &constants->model, &plant->state);
   d_command->supply += share * command->supply;
   for (int i = 0; i < HX_JOINTS * HX_SLOTS; ++i)
     d_command->duty[i / HX_SLOTS][i % HX_SLOTS] +=
@@ -122,7 +122,7 @@ static void add_sag(const hxPlant *plant, double size, hxTangentPoint *point) {
   if (!(plant->model.supply_resistance > 0.0 && size > 0.0)) return;
   for (int k = -3; k <= 3; ++k) {
     for (int i = 0; i < COUNT; ++i) to[i] = from[i] + k * h * change[i];
-    hx_command_supply(&moved, &plant->model, &plant->state);
+    hx_supply_power(&moved, &plant->model, &plant->state);
     if (k != 0) sum += (k > 0 ? weight[k - 1] : -weight[-k - 1]) * moved.supply;
   }
   point->d_command.supply = sum / h;

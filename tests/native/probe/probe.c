@@ -74,7 +74,7 @@ HX_API void hx_probe_soil(const hxSoilDefinition *definition, const double *row,
   const hxSoilForces f = hx_soil_normal_force(&soils, p, at, hx_splat(dz), virgin);
   const hxReal result[10] = {virgin.force,
                              virgin.slope,
-                             hx_plastic_depth(&soils, at, virgin),
+                             plastic_depth(&soils, at, virgin),
                              f.force,
                              f.elastic,
                              f.stiffness,
@@ -170,10 +170,10 @@ HX_API void hx_probe_sliding(const hxPlant *plant, const double slip[3], const d
   const hxReal one = hx_splat(1.0), zero = hx_splat(0.0);
   const hxFrictionAt at = {hx_splat(model->mu), hx_splat(model->static_rise)};
   const hxReal drag = hx_friction_drag(model, at, hx_sqrt(hx_dot(v, v)));
-  hxBristle f = {hx_scale(drag, v), hx_zero3(), zero, drag, zero};
+  hxGrip f = {hx_scale(drag, v), hx_zero3(), zero, drag, zero};
   if (hx_friction_kind(model->friction_law).has_bristles)
     f = hx_friction_grip(model, at, one, z, v);
-  put3(f.grip, 0, out), put3(f.rate, 0, out + 3);
+  put3(f.traction, 0, out), put3(f.rate, 0, out + 3);
   out[6] = hx_lane(f.stiffness, 0), out[7] = hx_lane(f.damping, 0),
   out[8] = hx_lane(f.relaxation, 0);
 }
@@ -273,7 +273,7 @@ static void evaluate(hxPlant *plant, const hxInput *input, double age, hxImplici
                      hxWork *work, hxRate *rate) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time - age);
-  hx_command_supply(&command, &plant->model, &plant->state);
+  hx_supply_power(&command, &plant->model, &plant->state);
   hx_dynamics_evaluate(&plant->model, &plant->state.contact, &command, plant->state.time,
                        &plant->state.motion, NULL, implicit, 1, work, rate);
 }
@@ -367,6 +367,17 @@ HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, doubl
   }
 }
 
+/* Copies what the servos' firmware and bus hold, of joints and legs: setpoints, their speeds, times
+ * above the overload limit, shares of the duty limits in the last call, commanded angles. */
+HX_API void hx_probe_firmware(const hxPlant *plant, double out[5][HX_JOINTS][HX_SLOTS]) {
+  const hxState *state = &plant->state;
+  memcpy(out[0], state->firmware.angle, sizeof out[0]);
+  memcpy(out[1], state->firmware.rate, sizeof out[1]);
+  memcpy(out[2], state->firmware.loaded, sizeof out[2]);
+  memcpy(out[3], state->duty, sizeof out[3]);
+  memcpy(out[4], state->bus.angle, sizeof out[4]);
+}
+
 /* Computes dy/dt with the i-th kernel. Returns its name, or NULL when there is none or the
  * processor does not support it. */
 HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
@@ -377,7 +388,7 @@ HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
     if (!hx_kernels[k]) return NULL;
   if (!hx_kernels[i]->is_supported()) return NULL;
   hx_command_from_input(&command, input, plant->state.time);
-  hx_command_supply(&command, &plant->model, &plant->state);
+  hx_supply_power(&command, &plant->model, &plant->state);
   hx_kernels[i]->derivative(&plant->model, &plant->state, &command, 1, plant->scratch, &rate);
   hx_bodies_from_motion(&plant->model, &rate, body);
   return hx_kernels[i]->name;
