@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from numbers import Real
-
-from hexapod_cosim.controller.signals import Measurement
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.models import HexapodError, unknown_name
 from hexapod_cosim.models.errors import check_type
@@ -34,10 +31,3 @@ def check_law(law: str) -> None:
     """Raises HexapodError for an unknown name."""
     if law not in LAWS:
         raise unknown_name("law", law, LAWS)
-
-
-def check_step(t: float, measurement: Measurement) -> None:
-    """Raises ControllerError for an argument of a step that has another type."""
-    check_type(t, Real, "a time [s]", where="t", error=ControllerError)
-    expected = "a Measurement"
-    check_type(measurement, Measurement, expected, where="measurement", error=ControllerError)

@@ -11,12 +11,13 @@ Kinematic control is the first line alone: it uses no measurement.
 
 from __future__ import annotations
 
+from numbers import Real
 from types import NoneType
 from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.controller.checks import ControllerError, check_law, check_period, check_step
+from hexapod_cosim.controller.checks import ControllerError, check_law, check_period
 from hexapod_cosim.controller.comply.compliant import Compliant, sense
 from hexapod_cosim.controller.comply.paper import Paper, Step
 from hexapod_cosim.controller.gains import Gains, Parts
@@ -253,9 +254,10 @@ class Controller(Stateful):
             measurement: sensor values at t; kinematic control does not use them.
 
         Raises:
-            ControllerError: t is not the time of the next step, or an argument has another type.
+            HexapodError: t is not the time of the next step, or an argument has another type.
         """
-        check_step(t, measurement)
+        check_type(t, Real, "a time [s]", where="t")
+        check_type(measurement, Measurement, "a Measurement", where="measurement")
         first = self._start is None
         due = t if self._start is None else self._start + (self._count + 1) * self.period
         if not abs(t - due) <= CLOCK_TOLERANCE * self.period:

@@ -26,10 +26,7 @@ def _upright() -> Array:
 
 @dataclass
 class Measurement:
-    """Sensor values of the robot. The arrays belong to the caller, who updates them in place.
-
-    Raises HexapodError for arrays of other shapes.
-    """
+    """Sensor values of the robot. The arrays belong to the caller, who updates them in place."""
 
     angle: Array = field(default_factory=_zeros)  # rad    (6, 3)
     speed: Array = field(default_factory=_zeros)  # rad/s    (6, 3)
@@ -40,7 +37,7 @@ class Measurement:
     angular_velocity: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
-        """Checks the shapes once; a step reads the arrays as they are."""
+        """Raises HexapodError for an array of another shape."""
         shapes = {"contact": (LEGS,), "quaternion": (4,), "angular_velocity": (3,)}
         for name, value in vars(self).items():
             array_of(value, shapes.get(name, (LEGS, 3)), where=name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -16,15 +17,11 @@ Vector6 = tuple[float, float, float, float, float, float]
 
 def array_of(value: Any, shape: tuple[int, ...], *, where: str) -> Array:
     """Returns an argument as an array. Raises HexapodError unless it has numbers and the shape."""
-    try:
+    got = value
+    with suppress(TypeError, ValueError):
         array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.shape == shape:
-        return array
-    raise HexapodError(
-        "wrong type of an argument",
-        got="nothing (None)" if value is None else value,
-        expected=f"an array of numbers of the shape {shape}",
-        where=where,
-    )
+        if array.shape == shape:
+            return array
+        got = f"shape {array.shape}" if array.ndim else value
+    expected = f"an array of numbers of the shape {shape}"
+    raise HexapodError("wrong type of an argument", got=str(got), expected=expected, where=where)

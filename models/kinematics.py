@@ -157,11 +157,7 @@ def _joint_model(torso: Torso, data: Leg, leg: int, joint: int) -> JointModel:
 def foot_position(leg: Leg, angle: Array) -> Array:
     """Returns the centre (3,) of the foot's sphere in the torso frame [m] at three joint angles
     [rad].
-
-    Raises HexapodError for arguments of other types or shapes.
     """
-    check_type(leg, Leg, "a leg of a Robot", where="leg")
-    angle = array_of(angle, (JOINTS,), where="angle")
     p_T = np.array(leg.hip_position)
     R_TP = axis_rotation(np.array([0.0, 0.0, 1.0]), leg.hip_yaw)
     for link, q in zip(leg.links, angle, strict=True):
@@ -172,10 +168,7 @@ def foot_position(leg: Leg, angle: Array) -> Array:
 
 
 def foot_positions(robot: Robot, angle: Array) -> Array:
-    """Returns the feet's centres (6, 3) in the torso frame [m] at joint angles (6, 3) [rad].
-
-    Raises HexapodError for arguments of other types or shapes.
-    """
+    """Returns the feet's centres (6, 3) in the torso frame [m] at joint angles (6, 3) [rad]."""
     check_type(robot, Robot, "a Robot, as of load_robot()", where="robot")
     angles = array_of(angle, (LEGS, JOINTS), where="angle")
     return np.array([foot_position(leg, q) for leg, q in zip(robot.legs, angles, strict=True)])

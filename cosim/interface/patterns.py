@@ -34,8 +34,7 @@ def with_defaults(
     """Returns an entry of interface.toml with the values that follow from name, causality and unit.
 
     Parameters are fields of nested structures: {leg}.{joint}.mass is leg[leg].link[joint].mass.
-    Others are arrays over their axes: {leg}.foot.force[i] is foot.force[leg][i]. Raises
-    HexapodError for an unknown unit.
+    Others are arrays over their axes: {leg}.foot.force[i] is foot.force[leg][i].
     """
     name = entry["name"]
     defaults: dict[str, Any] = {"size": 3} if "[i]" in name else {}

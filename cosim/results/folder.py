@@ -226,7 +226,8 @@ def read_scenario(folder: Path) -> str:
     try:
         return read_text(folder / SCENARIO)
     except (OSError, UnicodeDecodeError) as error:
-        raise _damaged(folder / SCENARIO, str(error), "the scenario that was run") from error
+        got = why_unreadable(error, "text")
+        raise _damaged(folder / SCENARIO, got, "the scenario that was run") from error
 
 
 def _damaged(path: Path, got: str, expected: str) -> HexapodError:

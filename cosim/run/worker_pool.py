@@ -122,14 +122,13 @@ class WorkerPool(Executor):
 def _refuse_unguarded_script() -> None:
     """Raises HexapodError for a script that every worker process would run again from its start."""
     main = sys.modules["__main__"]
-    path = getattr(main, "__file__", None)
-    if path is None or main.__spec__ is not None or not Path(path).is_file():
-        return
-    if "__name__" in Path(path).read_text(encoding="utf-8", errors="replace"):
+    path = Path(getattr(main, "__file__", None) or "")
+    is_script = main.__spec__ is None and path.is_file()
+    if not is_script or "__name__" in path.read_text(encoding="utf-8", errors="replace"):
         return
     raise HexapodError(
         "worker processes would run the script again",
-        got=path,
+        got=str(path),
         expected='calls below `if __name__ == "__main__":`',
         fix="write this line above them and indent them, or ask for one worker",
     )

@@ -84,10 +84,9 @@ def scenario_from_table(
         check_parameters(scenario, given=given)
     except ScenarioError as error:
         key = (error.where or "").removeprefix(f"{where}: ")
-        unknown = f"{key}.{error.got}"
-        if unknown in given:
-            error.where = f"{option}{unknown}"
-        elif key in given or key.partition("[")[0] in given:  # also of an entry in a list
+        if f"{key}.{error.got}" in given:  # an unknown key
+            key = f"{key}.{error.got}"
+        if {key, key.partition("[")[0]} & set(given):  # also of an entry in a list
             error.where = f"{option}{key}"
         raise
     return scenario

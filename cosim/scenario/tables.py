@@ -72,14 +72,6 @@ def read_overrides(overrides: Iterable[str], where: str = "--set") -> dict[str, 
     return values
 
 
-def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
-    """Returns a copy of the tables with each "NAME=VALUE" set. Raises ScenarioError.
-
-    NAME is a key of the scenario or else an FMU parameter.
-    """
-    return with_values(table, read_overrides(overrides))
-
-
 def with_values(
     table: Mapping[str, Any], values: Mapping[str, Any], where: str = "--set"
 ) -> dict[str, Any]:

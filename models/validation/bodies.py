@@ -148,8 +148,7 @@ def check_robot(robot: Robot, *, where: str | None = None) -> None:
 
     where: name of the robot's file for messages.
     """
-    expected = "a Robot, as of load_robot()"
-    check_type(robot, Robot, expected, where="robot", error=RobotError)
+    check_type(robot, Robot, "a Robot, as of load_robot()", where="robot", error=RobotError)
     at = f"{where or robot.name}: "
     Vector("m/s2", 3).read(robot.gravity, at + "gravity")
     for name in ("torso", "foot", "gait"):
