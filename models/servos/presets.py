@@ -67,9 +67,12 @@ def _measured() -> dict[str, Measured]:
     """Returns all servos, sorted by name."""
     found = {}
     for path in sorted((Path(__file__).parent / "data").glob("*.toml")):
-        for name, table in tomllib.loads(path.read_text(encoding="utf-8")).items():
-            where = f"{path}: {name}"
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        shared = tables.pop("shared", {})
+        for name, given in tables.items():
+            where, table = f"{path}: {name}", shared | given
             own = {key: table.pop(key) for key in specs(About) if key in table}
+            own["source"] = own["source"].format_map(own)
             about = About(**require(About, read_given(About, own, where), where))
             found[name] = Measured(about, read_given(Servo, table, where))
     return {name: found[name] for name in sorted(found)}
