@@ -2,8 +2,9 @@
  *
  * start_values.txt: the GUID; then, for every input and parameter in the order of their references,
  * a line "reference value name"; then "checksum" and 16 hexadecimal digits: hx_checksum over the
- * lines above without their line ends, where each line's checksum is the next one's seed. Reals are
- * hexadecimal (0x1.8p+1), so that they are exact and independent of the locale.
+ * lines above without their line ends, where each line's checksum is the next one's seed and
+ * hx_table_digest is the first one's. Reals are hexadecimal (0x1.8p+1), so that they are exact and
+ * independent of the locale.
  */
 #include "fmi/instance.h"
 
@@ -256,7 +257,9 @@ static hxStatus read_checksum(hxInstance *instance, hxReader *reader) {
            (unsigned long)(reader->checksum >> 32),
            (unsigned long)(reader->checksum & 0xffffffffu));
   if (!line || strcmp(line, expected) != 0)
-    return refuse(instance, reader, line, "the checksum of the lines above: they were changed");
+    return refuse(
+        instance, reader, line,
+        "the checksum of the lines above and of the binary's variables: one of them was changed");
   line = next_line(reader);
   return line ? refuse(instance, reader, line, "the end of the file") : HX_OK;
 }
@@ -272,7 +275,7 @@ static hxStatus check_start(hxInstance *instance, const struct hxVariables *vari
 }
 
 static hxStatus read_file(hxInstance *instance, FILE *file) {
-  hxReader reader = {.file = file};
+  hxReader reader = {.file = file, .next_checksum = hx_table_digest};
   struct hxVariables variables;
   const char *guid = next_line(&reader);
   if (!guid) return refuse(instance, &reader, NULL, "the FMU's GUID");

@@ -3,6 +3,8 @@
 #ifndef HEXAPOD_FMI_VARIABLES_H
 #define HEXAPOD_FMI_VARIABLES_H
 
+#include <stdint.h>
+
 #include "generated/variables.h"
 #include "hexapod/inside.h"
 
@@ -59,6 +61,9 @@ extern const unsigned hx_time_reference;
 
 /* Names of the log categories, in the order of hxLogCategory. */
 extern const char *const hx_log_category_names[];
+
+/* Identifies the table of variables: its rows and their references. */
+extern const uint64_t hx_table_digest;
 
 /* GUID of the model description with the compiled-in robot. */
 extern const char hx_default_guid[];

@@ -41,16 +41,21 @@ UNKNOWNS = 6 + LEGS * JOINTS
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
+def spin_energy(robot: Robot, body: Array) -> float:
+    """Returns the part of the kinetic energy by which rotors turn with the bodies (19, 13) that
+    carry them, the sum of h s.w_i [J] (eq. 54).
+    """
+    turns = carried_turns(robot, constraints(robot, body).G) @ body[:, 7:13].ravel()
+    return spin_inertia(robot.servo) * float(joint_speeds(robot, body).ravel() @ turns)
+
+
 def kinetic_energy(robot: Robot, body: Array) -> float:
     """Returns the kinetic energy [J] of the bodies (19, 13) and the geared rotors."""
     v, w = body[:, 7:10], body[:, 10:13]
     linear = masses(robot) @ np.sum(v * v, axis=1)
     angular = np.einsum("ki,kij,kj->", w, world_inertias(robot, body), w)
-    speed = joint_speeds(robot, body)
-    geared = robot.servo.rotor_inertia * np.sum(speed**2)
-    turns = carried_turns(robot, constraints(robot, body).G) @ body[:, 7:13].ravel()
-    carried = spin_inertia(robot.servo) * float(speed.ravel() @ turns)
-    return 0.5 * float(linear + angular + geared) + carried
+    geared = robot.servo.rotor_inertia * np.sum(joint_speeds(robot, body) ** 2)
+    return 0.5 * float(linear + angular + geared) + spin_energy(robot, body)
 
 
 def potential_energy(robot: Robot, body: Array) -> float:

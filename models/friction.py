@@ -104,15 +104,19 @@ def tanh_creep(friction: Friction, share: Array) -> Array:
     return np.asarray(np.arctanh(np.minimum(share, TANH_LIMIT)) / friction.slope)
 
 
+def friction_direction(friction: Friction, speed: float) -> float:
+    """Returns g of the law [s/m] at a speed [m/s]: f_t = -mu f_n g(|v_t|) v_t (eq. 15)."""
+    return LAWS[friction.law].direction(friction, speed)
+
+
 def friction_drag(friction: Friction, speed: float) -> float:
     """Returns the force over load and slip speed [s/m] of a law without bristles.
 
     It is mu(v) g(v) + viscous (eq. 15, 35) at a slip speed [m/s]; without friction 0.
     """
-    law = LAWS[friction.law]
-    if not law.has_friction:
+    if not friction.has_friction:
         return 0.0
-    along = law.direction(friction, speed)
+    along = friction_direction(friction, speed)
     return float(stribeck_curve(friction, speed)) * along + friction.viscous
 
 
@@ -154,19 +158,14 @@ def bristle_friction(friction: Friction, normal: float, slip: Array, bristle: Ar
     per_rate = 1.5 * friction.bristle_damping / friction.presliding
     u, d = bristle / friction.presliding, per_rate * (slip - plastic)
     size, push = float(np.linalg.norm(u)), float(np.linalg.norm(d))
-    limited = u / max(size, 1.0)
-    spring = limited * (3.0 - limited @ limited) / 2.0
-    room = 1.0 - float(np.linalg.norm(spring))
-    damped = d * (room / math.hypot(room, push)) if push > 0.0 else d
-    force = -normal * (mu * (spring + damped) + friction.viscous * slip)
-
-    secant = (3.0 - min(size, 1.0) ** 2) / (2.0 * max(size, 1.0))
-    room, push = 1.0 - secant * size, per_rate * float(np.linalg.norm(slip - plastic))
+    spring = (3.0 - min(size, 1.0) ** 2) / (2.0 * max(size, 1.0))
+    room = 1.0 - spring * size
     share = room / math.hypot(room, push) if push > 0.0 or room > 0.0 else 0.0
+    force = -normal * (mu * (spring * u + share * d) + friction.viscous * slip)
     relaxation = float(bristle_yield(np.array(size))) * max(float(slip @ u), 0.0)
     relaxation /= max(size, SPRING_LIMIT) * friction.presliding
     damping = mu * per_rate * share + friction.viscous
-    return Grip(force, damping, mu * secant / friction.presliding, relaxation)
+    return Grip(force, damping, mu * spring / friction.presliding, relaxation)
 
 
 # LuGre

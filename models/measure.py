@@ -15,7 +15,7 @@ import numpy as np
 
 from hexapod_cosim.models.actuator import servo_torque, stop_energy
 from hexapod_cosim.models.arrays import Array
-from hexapod_cosim.models.contact.geometry import foot_contacts
+from hexapod_cosim.models.contact.geometry import FootContact, foot_contacts, slip_velocity
 from hexapod_cosim.models.contact.law import normal_force
 from hexapod_cosim.models.dynamics import Command, joint_overruns
 from hexapod_cosim.models.kinematics import (
@@ -26,7 +26,7 @@ from hexapod_cosim.models.kinematics import (
     joint_angles,
     joint_speeds,
 )
-from hexapod_cosim.models.method import cubic
+from hexapod_cosim.models.method import cubic, parabola
 from hexapod_cosim.models.records import Robot
 
 # nodes of a step for the forces of feet; motors use every second one
@@ -92,36 +92,47 @@ def mean_slip(robot: Robot, before: Array, after: Array, h: float) -> Array:
     return np.array(slips)
 
 
+def contact_works(
+    robot: Robot, first: FootContact, last: FootContact, impulse: Array
+) -> tuple[float, float]:
+    """Returns what a closed contact and its friction lose in a step [J] (eq. 27).
+
+    The loss in contact is the work of the normal force minus the growth of the stored energy 2/5 K
+    delta^(5/2). first, last: the contact at both ends; impulse: (3,) of the ground [N s].
+    """
+    approach = 0.5 * (first.approach_speed + last.approach_speed)
+    depths = np.maximum([first.penetration, last.penetration], 0.0)
+    before, after = 0.4 * robot.contact.stiffness * depths**2.5
+    slip = 0.5 * (slip_velocity(first) + slip_velocity(last))
+    taken = float(impulse @ (0.5 * (first.normal + last.normal))) * approach
+    return taken - float(after - before), -float(impulse @ slip)
+
+
+def push_work(before: Array, after: Array, impulse: Array) -> float:
+    """Returns the work [J] of the push's impulses (6,) on the torso [N s, N m s] (eq. 27)."""
+    return float(impulse @ (before + after)[0, 7:13]) / 2.0
+
+
 def step_works(
     robot: Robot, before: Array, after: Array, h: float, impulses: Impulses, closed: Array
 ) -> Works:
     """Returns the works of a step (eq. 27): impulses times the mean of the speeds at its ends.
 
-    The loss in contact is the work of the normal force minus the growth of the stored energy 2/5 K
-    delta^(5/2), and that of the stops their work minus the growth of k x^2/2. closed (6,): feet in
-    contact during the step.
+    The loss of the stops is their work minus the growth of k x^2/2. closed (6,): feet in contact
+    during the step.
     """
     speed = 0.5 * (joint_speeds(robot, before) + joint_speeds(robot, after))
     contact = friction = 0.0
-    for leg, (first, last) in enumerate(
-        zip(foot_contacts(robot, before), foot_contacts(robot, after), strict=True)
-    ):
-        normal = 0.5 * (first.normal + last.normal)
-        depths = np.maximum([first.penetration, last.penetration], 0.0)
-        stored = 0.4 * robot.contact.stiffness * depths**2.5 * closed[leg]
-        contact += float(impulses.foot[leg] @ normal) * 0.5 * (
-            first.approach_speed + last.approach_speed
-        ) - float(stored[1] - stored[0])
-        slips = [foot.velocity + foot.approach_speed * foot.normal for foot in (first, last)]
-        friction -= float(impulses.foot[leg] @ (0.5 * (slips[0] + slips[1])))
-        tibia = JOINTS * (leg + 1)
-        friction -= float(impulses.moment[leg] @ (before + after)[tibia, 10:13]) / 2.0
+    feet = [foot_contacts(robot, body) for body in (before, after)]
+    for leg in np.flatnonzero(closed):
+        losses = contact_works(robot, feet[0][leg], feet[1][leg], impulses.foot[leg])
+        turn = (before + after)[JOINTS * (leg + 1), 10:13]
+        contact += losses[0]
+        friction += losses[1] - float(impulses.moment[leg] @ turn) / 2.0
     gear = -float(np.sum((impulses.gear + impulses.stop) * speed))
-    springs = [
-        float(np.sum(stop_energy(robot.servo, joint_overruns(robot, body))))
-        for body in (before, after)
-    ]
-    return Works(impulses.motor * speed, contact, friction, gear - (springs[1] - springs[0]))
+    stored = [stop_energy(robot.servo, joint_overruns(robot, body)) for body in (before, after)]
+    gear -= float(np.sum(stored[1] - stored[0]))
+    return Works(impulses.motor * speed, contact, friction, gear)
 
 
 def measure_cone(robot: Robot, before: Array, after: Array, h: float, impulses: Impulses) -> Array:
@@ -171,10 +182,8 @@ def measure_joints(
     # the difference from the step's work is added to the larger part
     rest = work - (positive - negative)
     drives = positive > negative
-    positive, negative = (
-        positive + np.where(drives, rest, 0.0),
-        negative - np.where(drives, 0.0, rest),
-    )
+    positive = positive + np.where(drives, rest, 0.0)
+    negative = negative - np.where(drives, 0.0, rest)
     excess = np.minimum(np.minimum(positive, negative), 0.0)
     return positive - excess, negative - excess, squared
 
@@ -190,25 +199,12 @@ def measure_feet(
     slope = [h * np.array([foot.approach_speed for foot in feet]) for feet in ends]
     depth, rate, second = cubic(delta[0], slope[0], delta[1] - delta[0], slope[1], NODES)
     d, closed = np.nan_to_num(damping), ~np.isnan(damping)
-    elastic = np.where(closed, robot.contact.stiffness * np.maximum(depth, 0.0) ** 1.5, 0.0)
-    factor = 1.0 + d * rate / h
-    force = elastic * np.maximum(factor, 0.0)
-    stiffness = np.where(
-        closed & (factor > 0.0),
-        1.5 * robot.contact.stiffness * np.sqrt(np.maximum(depth, 0.0)) * factor,
-        0.0,
-    )
+    K, root = robot.contact.stiffness * closed, np.sqrt(np.maximum(depth, 0.0))
+    factor, elastic = np.maximum(1.0 + d * rate / h, 0.0), K * root**3
+    force, stiffness = elastic * factor, 1.5 * K * root * factor
     rises = stiffness * rate / h + np.where(factor > 0.0, elastic * d, 0.0) * second / h**2
-    slips = [
-        np.array([foot.velocity + foot.approach_speed * foot.normal for foot in feet])
-        for feet in ends
-    ]
-    x = NODES[:, None, None]
-    slip = (
-        (1.0 - x * (4.0 - 3.0 * x)) * slips[0]
-        + x * (3.0 * x - 2.0) * slips[1]
-        + 6.0 * x * (1.0 - x) * mean_slip(robot, before, after, h)
-    )
+    slips = [np.array([slip_velocity(foot) for foot in feet]) for feet in ends]
+    slip = parabola(slips[0], slips[1], mean_slip(robot, before, after, h), NODES)
     slipped = _under_load(robot, h, force, np.linalg.norm(slip, axis=-1))
     return slipped, h * FOOT_WEIGHTS @ force, force.max(axis=0), np.maximum(rises.max(axis=0), 0.0)
 

@@ -168,6 +168,15 @@ def cubic(
     return value, slope_start + x * (2.0 * curve + 3.0 * x * bend), 2.0 * curve + 6.0 * x * bend
 
 
+def parabola(start: Array, end: Array, mean: Array, x: Array) -> Array:
+    """Returns values at x (nodes,) in [0, 1] of parabolas through both ends with these means
+    (eq. 28).
+    """
+    x = x.reshape(-1, *(1 for _ in np.shape(start)))
+    ends = (1.0 - x * (4.0 - 3.0 * x)) * start + x * (3.0 * x - 2.0) * end
+    return np.asarray(ends + 6.0 * x * (1.0 - x) * mean)
+
+
 def deepest(start: float, slope_start: float, end: float, slope_end: float) -> float:
     """Returns the largest value on [0, 1] of the cubic with these ends and slopes (eq. 28)."""
     if not (slope_start > 0.0 and slope_end < 0.0):

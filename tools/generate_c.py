@@ -152,6 +152,7 @@ def render_variables(interface: Interface, guid: str) -> str:
     lines += ["", "const char *const hx_log_category_names[] = {"]
     lines += [f'    "{name}",' for name in interface.log_categories]
     lines += ["};", "", *_states(interface)]
+    lines += [f"const uint64_t hx_table_digest = {interface.table_digest:#018x}u;", ""]
     lines += [f'const char hx_default_guid[] = "{guid}";', "", *_enumeration_checks(interface), ""]
     return "\n".join(lines)
 

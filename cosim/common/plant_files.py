@@ -251,15 +251,14 @@ def _modification_time(path: Path) -> int:
 
 def _refuse_stale(path: Path, component: Component) -> None:
     """Raises FmuError when sources of the source tree are newer than the binary."""
-    changed = (
-        [
-            name
-            for name, source in source_files(component).items()
-            if _modification_time(source) > _modification_time(path)
-        ]
-        if in_source_tree()
-        else []
-    )
+    if not in_source_tree():
+        return
+    table = {"interface.toml": _COSIM.parent / component.tree / "interface.toml"}
+    changed = [
+        name
+        for name, source in (source_files(component) | table).items()
+        if _modification_time(source) > _modification_time(path)
+    ]
     if changed:
         raise FmuError(
             f"the {component.name} binary is older than its sources",

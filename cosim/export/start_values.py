@@ -16,10 +16,11 @@ SETTABLE: tuple[Causality, ...] = ("input", "parameter")
 def start_values(interface: Interface, guid: str) -> str:
     """Returns start_values.txt, which the binary reads at instantiation (fmi/resources.c).
 
-    It holds the GUID, a line "reference value name" for every input and parameter, and a checksum.
+    It holds the GUID, a line "reference value name" for every input and parameter, and a checksum,
+    which begins with the digest of the table of variables: a binary with another table refuses it.
     """
     lines = [guid, *map(_start_line, interface.of_causality("input", "parameter"))]
-    total = reduce(checksum, (line.encode() for line in lines), 0)
+    total = reduce(checksum, (line.encode() for line in lines), interface.table_digest)
     return "\n".join([*lines, f"checksum {total:016x}"]) + "\n"
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from operator import attrgetter
 from typing import Literal
 
 from hexapod_cosim.cosim.common.components import Component
@@ -14,6 +16,10 @@ from hexapod_cosim.models.records import Robot
 
 Causality = Literal["input", "output", "parameter", "local"]
 Type = Literal["Real", "Boolean", "Enumeration", "Integer"]
+_IN_TABLE = (
+    *("reference", "name", "type", "causality", "variability", "unit", "minimum", "maximum"),
+    *("field", "group"),
+)  # of a Variable, for its binary
 CAUSALITIES: tuple[Causality, ...] = ("input", "output", "parameter", "local")
 
 
@@ -158,6 +164,15 @@ class Interface:
     def reinitialised(self) -> frozenset[str]:
         """Names of the states that an event may set."""
         return frozenset(state.name for state in self.states if state.reinit)
+
+    @cached_property
+    def table_digest(self) -> int:
+        """64 bits that identify what a binary has to know of the variables: all but start values,
+        texts and dependencies.
+        """
+        facts = attrgetter(*_IN_TABLE)
+        rows = [facts(one) for one in self.variables]
+        return int.from_bytes(hashlib.sha256(repr(rows).encode()).digest()[:8], "big")
 
     def depends(self, name: str) -> tuple[str, ...] | None:
         """Returns the states and inputs that an output or derivative is a direct function of.

@@ -16,7 +16,12 @@ import numpy as np
 
 from hexapod_cosim.models.arrays import Array
 from hexapod_cosim.models.contact.law import Contact, contact_damping, normal_force
-from hexapod_cosim.models.friction import LAWS, Friction, friction_force, stribeck_curve
+from hexapod_cosim.models.friction import (
+    Friction,
+    friction_direction,
+    friction_force,
+    stribeck_curve,
+)
 from hexapod_cosim.models.ground.faces import Face, ground_faces
 from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, foot_centres, skew
 from hexapod_cosim.models.records import Robot
@@ -96,17 +101,12 @@ def turning_slopes(
     radius: that of the sphere [m]; its speeds R |w_n| and R |w_t| regularise the moments.
     normal: (3,) of the ground; turn: angular velocity (3,) [rad/s].
     """
-    direction = LAWS[friction.law].direction
     spin = float(normal @ turn)
     slow = radius * abs(spin)
     fast = radius * float(np.linalg.norm(turn - spin * normal))
-    return (
-        friction.spin_radius
-        * radius
-        * float(stribeck_curve(friction, slow))
-        * direction(friction, slow),
-        friction.rolling_radius * radius * direction(friction, fast),
-    )
+    about = float(stribeck_curve(friction, slow)) * friction_direction(friction, slow)
+    across = friction_direction(friction, fast)
+    return friction.spin_radius * radius * about, friction.rolling_radius * radius * across
 
 
 def turning_moment(

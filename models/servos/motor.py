@@ -162,10 +162,8 @@ def warm_servo(
     """
     g, k = 1.0 / servo.winding_to_housing, 1.0 / servo.housing_to_air
     a, b = 2.0 * servo.winding_capacity / h, 2.0 * servo.housing_capacity / h
-    of_winding, of_housing = (
-        copper / h + a * winding,
-        gear / h + b * housing + k * servo.air_temperature,
-    )
+    of_winding = copper / h + a * winding
+    of_housing = gear / h + b * housing + k * servo.air_temperature
     determinant = (a + g) * (b + g + k) - g * g
     mean_winding = ((b + g + k) * of_winding + g * of_housing) / determinant
     mean_housing = (g * of_winding + (a + g) * of_housing) / determinant

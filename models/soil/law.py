@@ -12,7 +12,6 @@ A foot is a sphere of radius R = foot.radius, or on soil a flat round pad of foo
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -53,27 +52,27 @@ def bekker_modulus(soil: Soil, foot: Foot) -> float:
     return soil.cohesive_modulus / soil_radius(foot) + soil.frictional_modulus
 
 
-def column_sum(foot: Foot, z: float, n: float) -> float:
-    """Returns the integral of (local depth)^n over the foot's area [m^(n+2)] (eq. 41).
+def column_sum(foot: Foot, z: float, n: float) -> tuple[float, float]:
+    """Returns the integral of (local depth)^n over the foot's area [m^(n+2)] and its derivative by
+    z > 0 (eq. 41).
 
     The columns under a sphere end at its lower half: a sphere deeper than R has columns under its
     whole area.
     """
     if foot.pad_radius > 0.0:
-        return float(soil_area(foot) * z**n)
-    R = foot.radius
+        A = soil_area(foot)
+        return float(A * z**n), float(A * n * z ** (n - 1.0))
+    R, above = foot.radius, max(z - foot.radius, 0.0)
     whole = z ** (n + 1.0) * (R / (n + 1.0) - z / ((n + 1.0) * (n + 2.0)))
-    above = max(z - R, 0.0) ** (n + 2.0) / ((n + 1.0) * (n + 2.0))
-    return float(2.0 * math.pi * (whole + above))
+    rest = above ** (n + 2.0) / ((n + 1.0) * (n + 2.0))
+    slope = z**n * (R - z / (n + 1.0)) + above ** (n + 1.0) / (n + 1.0)
+    return float(2.0 * math.pi * (whole + rest)), float(2.0 * math.pi * slope)
 
 
-def column_slope(foot: Foot, z: float, n: float) -> float:
-    """Returns the derivative of `column_sum` by z, z > 0."""
-    if foot.pad_radius > 0.0:
-        return float(soil_area(foot) * n * z ** (n - 1.0))
-    R = foot.radius
-    whole = z**n * (R - z / (n + 1.0))
-    return float(2.0 * math.pi * (whole + max(z - R, 0.0) ** (n + 1.0) / (n + 1.0)))
+def bekker_sum(soil: Soil, foot: Foot, z: float) -> tuple[float, float]:
+    """Returns force [N] and slope [N/m] of k z^n over the foot at depth z [m] (eq. 40)."""
+    k, (force, slope) = bekker_modulus(soil, foot), column_sum(foot, z, soil.exponent)
+    return k * force, k * slope
 
 
 def granular_sum(soil: Soil, foot: Foot, z: float) -> tuple[float, float]:
@@ -97,33 +96,24 @@ def granular_sum(soil: Soil, foot: Foot, z: float) -> tuple[float, float]:
     return 2 * math.pi * R**3 * force, 2 * math.pi * R**2 * slope
 
 
+def mud_sum(soil: Soil, foot: Foot, z: float) -> tuple[float, float]:
+    """Returns force [N] and slope [N/m] of mud at depth z [m] (eq. 43)."""
+    p, H = soil.yield_pressure, soil.hardening
+    flat, deep = column_sum(foot, z, 0.0), column_sum(foot, z, 1.0)
+    return p * flat[0] + H * deep[0], p * flat[1] + H * deep[1]
+
+
+SUMS = {"bekker": bekker_sum, "granular": granular_sum, "mud": mud_sum}
+
+
 def virgin_force(soil: Soil, foot: Foot, z: float) -> float:
     """Returns F_v [N], the force of a first monotone loading to depth z [m] (eq. 40-43)."""
-    return _virgin(soil, foot, z, column_sum, 0) if z > 0.0 else 0.0
+    return SUMS[soil.law](soil, foot, z)[0] if z > 0.0 else 0.0
 
 
 def virgin_slope(soil: Soil, foot: Foot, z: float) -> float:
     """Returns dF_v/dz [N/m] at z > 0."""
-    return _virgin(soil, foot, z, column_slope, 1)
-
-
-def _virgin(
-    soil: Soil, foot: Foot, z: float, column: Callable[[Foot, float, float], float], granular: int
-) -> float:
-    """Returns force or slope of the virgin curve at z > 0.
-
-    Args:
-        soil: the soil.
-        foot: the foot.
-        z: depth [m].
-        column: `column_sum` or `column_slope`.
-        granular: index of the same quantity in `granular_sum`.
-    """
-    if soil.law == "bekker":
-        return bekker_modulus(soil, foot) * column(foot, z, soil.exponent)
-    if soil.law == "granular":
-        return granular_sum(soil, foot, z)[granular]
-    return soil.yield_pressure * column(foot, z, 0.0) + soil.hardening * column(foot, z, 1.0)
+    return SUMS[soil.law](soil, foot, z)[1]
 
 
 def sinkage(soil: Soil, foot: Foot, load: float) -> float:
@@ -209,16 +199,20 @@ def profile_moment(foot: Foot, z: float) -> float:
     return 2.0 / 3.0 * chord**3 - c * (R * R * math.atan2(chord, c) - c * chord)
 
 
-def shear_limit(soil: Soil, foot: Foot, z: float, load: float) -> float:
-    """Returns T_max [N], the largest shear force at depth z [m] under a normal force (eq. 46).
+def shear_base(soil: Soil, foot: Foot, z: float) -> float:
+    """Returns the shear force [N] at depth z [m] that does not depend on the load (eq. 46).
 
-    Cohesion over the contact area, friction of the load, and in granular media the resistance of
-    the foot's profile.
+    Cohesion over the contact area, and in granular media the resistance of the foot's profile.
     """
-    ahead = 0.0
-    if soil.law == "granular":
-        ahead = soil.resistance * soil.alpha_ahead * profile_moment(foot, z)
-    return soil.cohesion * contact_area(foot, z) + load * math.tan(soil.friction_angle) + ahead
+    base = soil.cohesion * contact_area(foot, z)
+    if soil.law != "granular":
+        return base
+    return base + soil.resistance * soil.alpha_ahead * profile_moment(foot, z)
+
+
+def shear_limit(soil: Soil, foot: Foot, z: float, load: float) -> float:
+    """Returns T_max [N], the largest shear force at depth z [m] under a normal force (eq. 46)."""
+    return shear_base(soil, foot, z) + load * math.tan(soil.friction_angle)
 
 
 def shear_rate(soil: Soil, slip: Array, bristle: Array) -> Array:

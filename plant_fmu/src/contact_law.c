@@ -25,8 +25,9 @@ double hx_exact_restitution_chi(double e) {
   return 0.5 * (low + high);
 }
 
-/* The constants chi of the laws (eq. 14); hertz and constant: damping, s/m. */
-static double exact(const hxDefinition *d) {
+/* ---- constants of the laws: chi (eq. 14), of hertz and constant_damping d, s/m ---- */
+
+static double exact_restitution(const hxDefinition *d) {
   return hx_exact_restitution_chi(d->contact.restitution);
 }
 static double flores(const hxDefinition *d) {
@@ -36,7 +37,7 @@ static double lankarani_nikravesh(const hxDefinition *d) {
   return 0.75 * (1.0 - d->contact.restitution * d->contact.restitution);
 }
 static double hunt_crossley(const hxDefinition *d) { return 1.5 * (1.0 - d->contact.restitution); }
-static double constant(const hxDefinition *d) { return 1.5 * d->contact.damping_factor; }
+static double constant_damping(const hxDefinition *d) { return 1.5 * d->contact.damping_factor; }
 static double hertz(const hxDefinition *d) {
   (void)d;
   return 0.0;
@@ -53,17 +54,22 @@ static double independent_of_speed(const hxModel *model, double impact_speed) {
 }
 
 static const hxContactRow contact_rows[] = {
-    [HX_CONTACT_EXACT_RESTITUTION] = {exact, over_impact_speed},
+    [HX_CONTACT_EXACT_RESTITUTION] = {exact_restitution, over_impact_speed},
     [HX_CONTACT_FLORES] = {flores, over_impact_speed},
     [HX_CONTACT_LANKARANI_NIKRAVESH] = {lankarani_nikravesh, over_impact_speed},
     [HX_CONTACT_HUNT_CROSSLEY] = {hunt_crossley, over_impact_speed},
-    [HX_CONTACT_CONSTANT_DAMPING] = {constant, independent_of_speed},
+    [HX_CONTACT_CONSTANT_DAMPING] = {constant_damping, independent_of_speed},
     [HX_CONTACT_HERTZ] = {hertz, independent_of_speed},
 };
 
 const hxContactRow *hx_contact(int law) {
   return law >= 1 && law < (int)(sizeof contact_rows / sizeof contact_rows[0]) ? &contact_rows[law]
                                                                                : NULL;
+}
+
+/* Returns d of eq. 14 of a contact that touches down at this speed, s/m. */
+static double contact_damping(const hxModel *model, double impact_speed) {
+  return hx_contact(model->contact_law)->damping(model, impact_speed);
 }
 
 /* Sets stiffness and friction of a contact to those of the ground of a material, NULL: of the
@@ -119,7 +125,7 @@ static void close_contact(const hxModel *model, const hxDepths *depths, int row,
   if (model->has_soil && row == HX_FOOT) set_soil(model, material, slot, contact);
   contact->closed[row][slot] = 1.0;
   contact->impact_speed[row][slot] = impact_speed;
-  contact->damping[row][slot] = hx_contact(model->contact_law)->damping(model, impact_speed);
+  contact->damping[row][slot] = contact_damping(model, impact_speed);
 }
 
 static void open_contact(hxContactState *contact, int row, int slot) {
@@ -173,7 +179,7 @@ static void start_in_soil(const hxDepths *depths, hxContactState *contact) {
     for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = contact->soil[i][slot];
     memcpy(&soil, numbers, sizeof soil);
     if (contact->closed[HX_FOOT][slot] != 0.0 && contact->on_soil[slot] != 0.0)
-      contact->plastic[slot] = hx_soil_plastic_depth(&soil, depths->delta[HX_FOOT][slot]);
+      contact->plastic[slot] = hx_plastic_depth(&soil, depths->delta[HX_FOOT][slot]);
   }
   hx_fill_slots(contact->plastic);
 }
@@ -200,7 +206,7 @@ void hx_contact_tune(const hxModel *model, const hxDepths *depths, hxContactStat
       const double impact_speed = contact->impact_speed[row][slot];
       if (contact->closed[row][slot] == 0.0) continue;
       set_ground(model, material, row, slot, contact);
-      contact->damping[row][slot] = hx_contact(model->contact_law)->damping(model, impact_speed);
+      contact->damping[row][slot] = contact_damping(model, impact_speed);
       if (row == HX_FOOT && contact->on_soil[slot] != 0.0) set_soil(model, material, slot, contact);
     }
     fill_contact_slots(contact, row);

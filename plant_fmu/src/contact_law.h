@@ -16,8 +16,8 @@ typedef struct {
 
 const hxContactRow *hx_contact(int law); /* NULL for an unknown law */
 
-/* Returns chi of the law with exact restitution e in (0, 1]: chi (1 + e) = ln[(1 + chi)/(1 - chi
- * e)]. */
+/* Returns chi of the law with exact restitution e in (0, 1] (eq. 14): chi (1 + e) = ln[(1 + chi)/(1
+ * - chi e)]. */
 double hx_exact_restitution_chi(double e);
 
 /* Opens all contacts and holds no cells. */
@@ -44,7 +44,7 @@ void hx_contact_hand_over(const hxMoment *before, const hxMoment *after, int cro
  * keep their impact speeds. */
 void hx_contact_tune(const hxModel *model, const hxDepths *depths, hxContactState *contact);
 
-/* Sets the bristles of open feet to 0 (eq. 16). */
+/* Sets the bristles of open feet to 0. */
 void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion);
 
 /* Returns whether a contact has to be closed or opened. */

@@ -187,7 +187,7 @@ typedef struct hxCommand {
   double weakness[HX_JOINTS][HX_SLOTS]; /* 1  share of its limits that a motor has lost */
 } hxCommand;
 
-/* Commands that servos hold until the bus transmits the next ones, legs innermost. */
+/* Commands that servos hold until the bus transmits the next ones; the first are hxCommand's. */
 typedef struct hxBus {
   double angle[HX_JOINTS][HX_SLOTS];  /* rad */
   double speed[HX_JOINTS][HX_SLOTS];  /* rad/s */
@@ -195,6 +195,8 @@ typedef struct hxBus {
   double start;                       /* s  of the first transmission */
   double sent;                        /* 1  transmissions since */
 } hxBus;
+
+enum { HX_JOINT_COMMANDS = offsetof(hxBus, start) }; /* bytes of angle, speed and torque */
 
 /* What the servos' firmware remembers, legs innermost. */
 typedef struct hxFirmware {

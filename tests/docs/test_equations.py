@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 from pages import COMMANDS
 
+from hexapod_cosim.models import CONTACT_LAWS
+
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "equations.md"
 OF_PAPER = 5  # equations that the source has
@@ -20,14 +22,18 @@ TAG = re.compile(r"\\tag\{([^}]*)\}")
 CITED = re.compile(r"(paper )?\b[Ee]qs?\. (\d+(?:(?:-|, | and )\d+\b(?!\.\d))*)")
 # equations of one form only: the sweep in O(n), to which models/ is dense, and the complex step
 IN_C_ALONE = {8, 9, 10, 11, 25, 55}
-# a C function with the comment above it that says what it computes
+# a C function, defined or declared, with the comment above it that says what it computes
 FUNCTION = re.compile(
-    r"/\*((?:(?!\*/).)*)\*/\n(?:HX_\w+ |static |inline )*\w+ \*?(\w+)\([^;{}]*\) \{", re.DOTALL
+    r"/\*((?:(?!\*/).)*)\*/\n(?:HX_\w+ |static |inline |const )*\w+ \*?(\w+)\([^;{}]*\)(?: \{|;)",
+    re.DOTALL,
 )
 # the modules of models/ with the equations of a file of plant_fmu/src
 TWINS = {
     "command/command.c": ["servos/motor"],
+    "command/command.h": ["servos/motor"],
     "contact_law.c": ["contact/law"],
+    "contact_law.h": ["contact/law"],
+    "ground/soil.h": ["soil/law"],
     "ground/soil_law.h": ["soil/law"],
     "kernels/integrator.h": ["integrator", "measure"],
     "kernels/output.h": ["energy"],
@@ -37,10 +43,11 @@ TWINS = {
     "lanes/foot.h": ["contact/law", "contact/forces"],
     "lanes/forces.h": ["dynamics", "actuator"],
     "lanes/friction.h": ["friction", "contact/geometry"],
-    "lanes/soil_path.h": ["method", "contact/switching"],
+    "lanes/soil_path.h": ["method", "contact/forces", "contact/switching"],
     "lanes/stage.h": ["stage"],
-    "measure/foot_measure.h": ["measure"],
+    "measure/foot_measure.h": ["measure", "method"],
     "measure/joint_measure.h": ["servos/motor"],
+    "measure/step_path.h": ["method"],
     "measure/works.h": ["measure"],
     "method.h": ["integrator"],
     "packs/vec3.h": ["kinematics"],
@@ -48,8 +55,6 @@ TWINS = {
 }
 # functions that cite an equation and have no counterpart in models/, with the reason
 OF_SWEEP = "the O(n) solution, to which models/dynamics.py and models/stage.py are dense"
-OF_LANES = "chooses in each lane between soil and rigid ground; `contact_force` does for a contact"
-OF_PLACE = "reads or stores numbers of an equation that another function computes"
 IN_C_WITH_REASON = {
     "joint_bias": OF_SWEEP,
     "couple_rotor": OF_SWEEP,
@@ -69,22 +74,12 @@ IN_C_WITH_REASON = {
     "store_torso_rate": OF_SWEEP,
     "store_link_rate": OF_SWEEP,
     "dynamics_evaluate": OF_SWEEP,
-    "soil_load": OF_LANES,
-    "replace_by_soil": OF_LANES,
-    "with_soil": OF_LANES,
-    "store_powers": OF_PLACE,
-    "add_impulses": OF_PLACE,
-    "fill_energy": OF_PLACE,
-    "move_drive": OF_PLACE,
-    "compile_gear": OF_PLACE,
-    "friction_direction": "the column `direction` of the table of laws in models/friction.py",
-    "exact": "a column of the table of laws, which calls `exact_restitution_chi`",
-    "mud": "the mud's case of `virgin_force`",
-    "shear_base": "`shear_limit` without the load's part, which lanes add",
+    "replace_by_soil": "the part of `contact_force` on soil, for lanes that touched down on it",
+    "store_powers": "rates of the works of eq. 27, which `step_works` computes",
+    "add_impulses": "sums over the stages of a step, which `step_works` receives",
+    "fill_energy": "the sum of works and of energies that other functions compute",
+    "move_drive": "commands that change within a call, which models/ leaves out",
     "wanted_torque": "the first line of `servo_torque`, before the limits",
-    "spin_energy": "the rotors' part of `kinetic_energy`",
-    "push_work": "the push's part of the works of a step, which `step_works` leaves out",
-    "contact_works": "the loop over feet in `step_works`",
     "cone_with_soil": "the cone on soil; `measure_cone` is for rigid ground",
 }
 TEXTS = {".c", ".h", ".py", ".md", ".toml", ".ipynb", ".cpp"}
@@ -172,7 +167,8 @@ def test_a_function_of_the_plant_has_the_name_of_its_equation_in_models() -> Non
     [
         (
             "lanes/friction.h",
-            "stribeck_curve friction_drag bristle_friction lugre_friction turning_moment",
+            "stribeck_curve friction_direction friction_drag bristle_friction lugre_friction "
+            "turning_moment",
         ),
         (
             "lanes/actuator.h",
@@ -180,12 +176,18 @@ def test_a_function_of_the_plant_has_the_name_of_its_equation_in_models() -> Non
             "measured_friction stop_torque",
         ),
         ("lanes/foot.h", "normal_force"),
-        ("measure/foot_measure.h", "measure_feet measure_landing measure_cone"),
+        ("measure/foot_measure.h", "measure_feet measure_landing measure_cone parabola"),
     ],
 )
 def test_the_laws_of_a_file_have_their_names_in_both_languages(file: str, names: str) -> None:
     ours = {name for of, name in functions_of_the_plant() if of == file}
     assert ours - set(IN_C_WITH_REASON) == set(names.split())
+
+
+def test_contact_laws_have_their_names_in_both_languages() -> None:
+    text = (ROOT / "plant_fmu/src/contact_law.c").read_text(encoding="utf-8")
+    rows = re.findall(r"static double (\w+)\(const hxDefinition \*d\)", text)
+    assert tuple(rows) == CONTACT_LAWS
 
 
 # of files of the repository, as comments and docstrings name them

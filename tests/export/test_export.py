@@ -23,9 +23,12 @@ from hexapod_cosim.cosim.export.reference import FOLDER, MANIFEST
 from hexapod_cosim.cosim.export.start_values import checksum, start_values
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.interface.plant import load_interface
+from hexapod_cosim.cosim.interface.records import Interface
 from hexapod_cosim.models.errors import HexapodError
 from hexapod_cosim.models.records import Robot
-from hexapod_cosim.models.robot import load_robot
+from hexapod_cosim.models.robot import list_robots, load_robot
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
@@ -36,7 +39,10 @@ def heavy() -> Robot:
 
 def write_resources(folder: Path, robot: Robot) -> str:
     """Writes start values of a robot to a folder; returns the GUID."""
-    interface = load_interface(robot)
+    return write_starts(folder, load_interface(robot))
+
+
+def write_starts(folder: Path, interface: Interface) -> str:
     guid = render_fmi2(interface).guid
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "start_values.txt").write_text(start_values(interface, guid), encoding="utf-8")
@@ -212,6 +218,31 @@ def test_an_impossible_robot_is_refused_at_instantiation(
         assert "torso.inertia_zz" in plant.last_message
 
 
+def test_a_binary_refuses_start_values_of_another_table_of_outputs(
+    plant_library: Path, tmp_path: Path
+) -> None:
+    """The outputs' names are not in the start values: with another order an angle would be read as
+    a speed.
+    """
+    interface = load_interface(load_robot("athena"))
+    angle, speed = (interface.variable(f"LF.femur.{name}") for name in ("angle", "speed"))
+    swapped = {
+        angle.name: dataclasses.replace(angle, reference=speed.reference),
+        speed.name: dataclasses.replace(speed, reference=angle.reference),
+    }
+    variables = tuple(swapped.get(one.name, one) for one in interface.variables)
+    guid = write_starts(tmp_path, dataclasses.replace(interface, variables=variables))
+    with Plant(plant_library, guid=guid, resources=tmp_path.as_uri()) as plant:
+        assert plant.component is None
+        assert "and of the binary's variables" in plant.last_message
+
+
+@pytest.mark.parametrize("robot", list_robots())
+def test_all_robots_have_the_table_of_the_binary(robot: str) -> None:
+    ours, default = (load_interface(load_robot(name)) for name in (robot, "athena"))
+    assert ours.table_digest == default.table_digest
+
+
 @pytest.mark.parametrize("data", [b"", b"a", b"12345678", b"123456789", bytes(range(256))])
 def test_the_exporter_s_checksum_is_the_plant_s(core: ctypes.CDLL, data: bytes) -> None:
     core.hx_checksum.restype = ctypes.c_uint64
@@ -236,7 +267,8 @@ def test_an_unwritable_path_is_one_error_and_leaves_no_file(
 def test_a_binary_is_stale_a_second_before_its_newest_source(
     plant_library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, age: int, stale: bool
 ) -> None:
-    built = int(max(path.stat().st_mtime for path in plant_files.source_files().values())) - age
+    sources = [*plant_files.source_files().values(), ROOT / "plant_fmu" / "interface.toml"]
+    built = int(max(path.stat().st_mtime for path in sources)) - age
     library = tmp_path / "binaries" / plant_files.fmi2_platform() / plant_library.name
     library.parent.mkdir(parents=True)
     library.write_bytes(b"")

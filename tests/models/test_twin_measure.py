@@ -26,6 +26,7 @@ from hexapod_cosim.models.measure import (
     measure_feet,
     measure_joints,
     measure_landing,
+    push_work,
     step_works,
 )
 from hexapod_cosim.models.method import METHOD
@@ -85,7 +86,9 @@ def test_a_step_s_measures_are_those_of_the_readable_equations(
     assert float(np.sum(output.cone_time[:30])) > 0.0
 
     assert int(np.count_nonzero(~np.isnan(damping))) > 1
+    pushed = H * np.concatenate([command.push_force, command.push_torque])
     parts = {
+        "push_work": push_work(before, after, pushed),
         "contact_loss": works.contact,
         "friction_loss": works.friction,
         "gear_loss": works.gear,

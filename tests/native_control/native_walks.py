@@ -26,7 +26,8 @@ ACCELERATION = (
     3e-12
 )
 LIMITS = (ANGLE, SPEED, TORQUE, ACCELERATION)
-STEPS = 1500  # a walk of 7.5 s
+STEPS = 1000  # a walk of 5 s
+PROGRAM = 7.5  # s    of the program below
 Sense = Callable[[Controller, int, Measurement], None]
 
 
@@ -86,12 +87,13 @@ def differences(
     *,
     sense: Sense,
     steps: int = STEPS,
-    command_at: Callable[[float], BodyCommand] = program,
+    command_at: Callable[[float], BodyCommand] | None = None,
     changes: dict[int, Gait] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns the largest differences of angle, speed, torque and acceleration over a walk, in rad
     and relative to the servo, and the fallback (steps, 6). The walk ends where they are too large.
 
+    command_at: the command at a time [s]; by default the program, which takes the whole walk.
     changes: gaits that the walk changes to, by steps.
 
     Asserts that the diagnostics are the same at every step.
@@ -105,11 +107,12 @@ def differences(
     )
     for k in range(steps):
         t = k * setup.period
+        command = program(PROGRAM * k / steps) if command_at is None else command_at(t)
         if changes and k in changes:
             reference.change_gait(changes[k])
             native.change_gait(changes[k])
-        expected = reference.step(t, command_at(t), measurement)
-        out = native.step(t, command_at(t), measurement)
+        expected = reference.step(t, command, measurement)
+        out = native.step(t, command, measurement)
         gap = np.abs(commands(out) - [getattr(expected, name) for name in COMMANDS])
         worst = np.maximum(worst, gap.max(axis=(1, 2)) / scale)
         if not (worst <= LIMITS).all():

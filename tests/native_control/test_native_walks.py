@@ -21,15 +21,7 @@ from native_walks import (
     uneven,
 )
 
-from hexapod_cosim.controller import (
-    SWITCHES,
-    BodyCommand,
-    Controller,
-    Gait,
-    Measurement,
-    Parts,
-    make_gait,
-)
+from hexapod_cosim.controller import SWITCHES, Controller, Gait, Measurement, Parts, make_gait
 from hexapod_cosim.cosim.interface.controller import ControllerSetup
 from hexapod_cosim.models import load_robot
 
@@ -66,64 +58,10 @@ def test_a_walk_that_changes_its_gait_is_the_same(
         setup_of(compliant=compliant),
         sense=Ground(),
         changes={step: make_gait(robot, name) for step, name in names.items()},
+        steps=1500,
     )
     assert close(worst)
     assert not fallback.any()
-
-
-@pytest.mark.parametrize("law", ["compliant", "paper"])
-def test_a_walk_that_loses_two_legs_and_takes_them_back_is_the_same(
-    controller_core: ct.CDLL, law: str
-) -> None:
-    """The joints of LF and RR rest for a time; the others follow their commands."""
-    rests = {0: range(300, 500), 5: range(420, 560)}
-    absent: set[tuple[bool, ...]] = set()
-
-    def sense(controller: Controller, step: int, measurement: Measurement) -> None:
-        resting = measurement.angle.copy()
-        measurement.angle[:] = controller._out.angle_ref
-        for leg, steps in rests.items():
-            if step in steps:
-                measurement.angle[leg] = resting[leg]
-        measurement.foot_force[:, 2] = 9.0 * ~controller.diagnostics.swinging
-        absent.add(tuple(controller.diagnostics.absent.tolist()))
-
-    setup = replace(setup_of(), law=law)
-    straight = BodyCommand(vx=0.06)
-    worst, _ = differences(
-        controller_core, setup, sense=sense, steps=1200, command_at=lambda _: straight
-    )
-    assert close(worst)
-    alone, both, none = (True, *5 * (False,)), (True, *4 * (False,), True), 6 * (False,)
-    assert {none, alone, both} <= absent
-
-
-@pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
-def test_a_walk_that_outruns_its_joints_is_the_same(controller_core: ct.CDLL, name: str) -> None:
-    """The gait changes while the command is too fast, and the posture is not level."""
-    shown: set[bool] = set()
-    ground = Ground()
-
-    def command_at(t: float) -> BodyCommand:
-        if t < 3.0:
-            return BodyCommand(0.5, 0.2, 0.4, -0.01, 0.03, 0.02)
-        return BodyCommand(vx=0.01) if t < 4.5 else BodyCommand(yaw_rate=-2.5)
-
-    def sense(controller: Controller, step: int, measurement: Measurement) -> None:
-        shown.add(bool(controller.diagnostics.outrun.any()))
-        ground(controller, step, measurement)
-
-    changes = {200: make_gait(load_robot(name), "wave")}
-    worst, _ = differences(
-        controller_core,
-        setup_of(name),
-        sense=sense,
-        command_at=command_at,
-        changes=changes,
-        steps=1200,
-    )
-    assert close(worst)
-    assert shown == {False, True}
 
 
 PAPER_PARTS = ("paper_share", "paper_pid", "paper_suspension")
@@ -138,9 +76,9 @@ def test_a_walk_under_the_papers_control_is_the_same(
     generator, stance = np.random.default_rng(5), load_robot(name).stance
 
     def sense(_: Controller, step: int, measurement: Measurement) -> None:
-        size = 1.0 + 9.0 * (step % 400 > 350)
+        size = 1.0 + 9.0 * (step % 200 > 150)
         measurement.foot_force[:] = size * (
-            generator.normal(size=(6, 3)) * 5.0 + [8.0 * (step % 900 > 700), 0.0, 10.0]
+            generator.normal(size=(6, 3)) * 5.0 + [8.0 * (step % 400 > 200), 0.0, 10.0]
         )
         measurement.angle[:] = stance + 0.05 * generator.normal(size=(6, 3))
         turn = np.array([1.0, *(0.02 * generator.normal(size=3))])
@@ -148,7 +86,7 @@ def test_a_walk_under_the_papers_control_is_the_same(
 
     parts = replace(ALL_PARTS, **({} if off is None else {off: False}))
     setup = replace(setup_of(name, gait, parts=parts), law="paper")
-    worst, fallback = differences(controller_core, setup, sense=sense, steps=1000)
+    worst, fallback = differences(controller_core, setup, sense=sense, steps=400)
     assert close(worst)
     assert not fallback.any()
 
@@ -159,11 +97,11 @@ def test_each_part_can_be_switched_off(controller_core: ct.CDLL, part: str) -> N
 
     def sense(controller: Controller, step: int, measurement: Measurement) -> None:
         ground(controller, step, measurement)
-        uneven(measurement.foot_force, step)
+        uneven(measurement.foot_force, step + 300)
         follow_forces(controller, measurement)
 
     setup = setup_of(parts=replace(ALL_PARTS, **{part: False}))
-    worst, _ = differences(controller_core, setup, sense=sense, steps=700)
+    worst, _ = differences(controller_core, setup, sense=sense, steps=450)
     assert close(worst)
 
 
@@ -174,7 +112,7 @@ def test_walks_with_a_planned_squeeze_are_the_same(
     controller_core: ct.CDLL, weight: float, gait: str
 ) -> None:
     setup = setup_of(gait=gait, parts=Parts(squeeze=weight))
-    worst, _ = differences(controller_core, setup, sense=Ground(), steps=700)
+    worst, _ = differences(controller_core, setup, sense=Ground(), steps=500)
     assert close(worst)
 
 
@@ -213,7 +151,7 @@ def test_another_period_gait_and_touch_down_speed_are_the_same_too(
     setup = ControllerSetup(
         robot=robot, gait=gait, period=0.008, gains=make_gains(robot, period=0.008)
     )
-    worst, _ = differences(controller_core, setup, sense=Ground(), steps=1100)
+    worst, _ = differences(controller_core, setup, sense=Ground(), steps=800)
     assert close(worst)
 
 
@@ -238,4 +176,4 @@ def test_legs_may_differ(controller_core: ct.CDLL) -> None:
     setup = ControllerSetup(
         robot=crooked, gait=make_gait(crooked), period=PERIOD, gains=make_gains(crooked)
     )
-    assert close(differences(controller_core, setup, sense=Ground(), steps=1400)[0])
+    assert close(differences(controller_core, setup, sense=Ground())[0])

@@ -102,9 +102,7 @@ static double next_sending(const hxModel *model, const hxState *state) {
 void hx_held_commands(hxCommand *command, const hxModel *model, const hxState *state) {
   if (!hx_has_bus(model)) return;
   if (state->time < next_sending(model, state) - bus_margin) {
-    memcpy(command->angle, state->bus.angle, sizeof command->angle);
-    memcpy(command->speed, state->bus.speed, sizeof command->speed);
-    memcpy(command->torque, state->bus.torque, sizeof command->torque);
+    memcpy(command, &state->bus, HX_JOINT_COMMANDS);
     return;
   }
   const double step = model->command_step;
@@ -116,9 +114,7 @@ void hx_held_commands(hxCommand *command, const hxModel *model, const hxState *s
 
 void hx_bus_send(hxCommand *command, const hxModel *model, hxState *state) {
   hx_held_commands(command, model, state);
-  memcpy(state->bus.angle, command->angle, sizeof command->angle);
-  memcpy(state->bus.speed, command->speed, sizeof command->speed);
-  memcpy(state->bus.torque, command->torque, sizeof command->torque);
+  memcpy(&state->bus, command, HX_JOINT_COMMANDS);
   if (model->bus_period > 0.0 && state->time >= next_sending(model, state) - bus_margin)
     state->bus.sent =
         floor((state->time + bus_margin - state->bus.start) / model->bus_period) + 1.0;

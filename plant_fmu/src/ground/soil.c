@@ -66,8 +66,8 @@ int hx_soil_row_error(const double row[13]) {
   return -1;
 }
 
-double hx_soil_plastic_depth(const hxSoil *soil, double z) {
+double hx_plastic_depth(const hxSoil *soil, double z) {
   hxSoils soils;
   memcpy(&soils, soil, sizeof soils);
-  return hx_plastic_depth(&soils, z, hx_virgin_force(&soils, z));
+  return plastic_depth(&soils, z, hx_virgin_force(&soils, z));
 }

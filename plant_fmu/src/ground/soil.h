@@ -39,7 +39,7 @@ void hx_soil_from_row(const double row[13], double radius, double pad_radius, hx
 int hx_soil_row_error(const double row[13]);
 
 /* Returns the depth that stays when depth z is unloaded, z - F_v(z)/(A Ke) >= 0 (eq. 44). */
-double hx_soil_plastic_depth(const hxSoil *soil, double z);
+double hx_plastic_depth(const hxSoil *soil, double z);
 
 HX_HIDDEN_END
 

@@ -63,14 +63,15 @@ static inline hxSoilCurves column_sum(const hxSoils *soil, hxReal modulus, hxRea
                        (hxSoilCurves){scale * force, scale * slope});
 }
 
-static inline hxSoilCurves bekker(const hxSoils *soil, hxReal z) {
+/* Returns k z^n over the foot (eq. 40). */
+static inline hxSoilCurves bekker_sum(const hxSoils *soil, hxReal z) {
   const hxReal n = soil->exponent, zero = hx_splat(0.0), above = z - soil->radius;
   const hxMask full = hx_less(zero, above) & hx_less(soil->pad, hx_splat(0.5));
   const hxReal q = hx_any(full) ? hx_select(full, hx_lanes_pow(above, n), zero) : zero;
   return column_sum(soil, soil->modulus, n, z, hx_lanes_pow(z, n), q);
 }
 
-/* eq. 42; e is the depth in radii */
+/* Returns force and slope of granular media (eq. 42); e is the depth in radii. */
 static inline hxSoilCurves granular_sum(const hxSoils *soil, hxReal z) {
   const hxReal down = soil->down, side = soil->side, R = soil->radius;
   const hxReal e = z / R, o = 1.0 - e, rest = down - side, flat = down * soil->area;
@@ -85,8 +86,8 @@ static inline hxSoilCurves granular_sum(const hxSoils *soil, hxReal z) {
       (hxSoilCurves){2.0 * pi * R * R * R * at.force, 2.0 * pi * R * R * at.slope});
 }
 
-/* eq. 43 */
-static inline hxSoilCurves mud(const hxSoils *soil, hxReal z) {
+/* Returns force and slope of mud (eq. 43). */
+static inline hxSoilCurves mud_sum(const hxSoils *soil, hxReal z) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxSoilCurves yield = column_sum(soil, soil->yield, zero, z, one, one);
   const hxSoilCurves hard = column_sum(soil, soil->hardening, one, z, z, z - soil->radius);
@@ -100,20 +101,20 @@ static inline hxSoilCurves hx_virgin_force(const hxSoils *soil, hxReal z) {
                is_granular = deep & has_law(soil, HX_SOIL_GRANULAR),
                is_mud = deep & has_law(soil, HX_SOIL_MUD);
   hxSoilCurves virgin = {zero, zero};
-  if (hx_any(is_bekker)) virgin = select_curves(is_bekker, bekker(soil, z), virgin);
+  if (hx_any(is_bekker)) virgin = select_curves(is_bekker, bekker_sum(soil, z), virgin);
   if (hx_any(is_granular)) virgin = select_curves(is_granular, granular_sum(soil, z), virgin);
-  if (hx_any(is_mud)) virgin = select_curves(is_mud, mud(soil, z), virgin);
+  if (hx_any(is_mud)) virgin = select_curves(is_mud, mud_sum(soil, z), virgin);
   return virgin;
 }
 
 /* ---- unloading and damping ---- */
 
 /* Returns the depths that stay when z is unloaded, with the virgin curve there (eq. 44). */
-static inline hxReal hx_plastic_depth(const hxSoils *soil, hxReal z, hxSoilCurves virgin) {
+static inline hxReal plastic_depth(const hxSoils *soil, hxReal z, hxSoilCurves virgin) {
   return hx_max(z - virgin.force / soil->unloading, hx_splat(0.0));
 }
 
-/* Returns min(A Ke (z - z_p), F_v(z)) of feet deeper than z_p, and its slope. */
+/* Returns min(A Ke (z - z_p), F_v(z)) of feet deeper than z_p, and its slope (eq. 44). */
 static inline hxSoilCurves elastic_force(const hxSoils *soil, hxReal plastic, hxReal z,
                                          hxSoilCurves virgin) {
   const hxSoilCurves line = {soil->unloading * (z - plastic), soil->unloading};
@@ -129,7 +130,8 @@ static inline hxMask hx_is_yielding(const hxSoils *soil, hxReal plastic, hxReal 
   return hx_less(hx_splat(0.0), dz) & ~hx_less(line, virgin);
 }
 
-/* Returns the area of the foot's cross-section at the surface, m2, and its slope by z, m. */
+/* Returns A(z) of eq. 45, the area of the foot's cross-section at the surface, m2, and its slope by
+ * z, m. */
 static inline hxSoilCurves contact_area(const hxSoils *soil, hxReal z) {
   const hxReal zero = hx_splat(0.0), R = soil->radius;
   const hxMask part = hx_less(z, R) & hx_less(soil->pad, hx_splat(0.5));
@@ -159,7 +161,7 @@ static inline hxSoilForces hx_soil_normal_force(const hxSoils *soil, hxReal plas
                         .viscosity = hx_select(pushes, viscosity, zero)};
 }
 
-/* Returns the energy that unloading gives back, J. */
+/* Returns the energy that unloading gives back, F^2/(2 A Ke) with F of eq. 44, J. */
 static inline hxReal hx_stored_energy(const hxSoils *soil, hxReal plastic, hxReal z,
                                       hxSoilCurves virgin) {
   const hxMask touches = hx_less(plastic, z);
@@ -170,7 +172,7 @@ static inline hxReal hx_stored_energy(const hxSoils *soil, hxReal plastic, hxRea
 
 /* ---- shear ---- */
 
-/* Returns the integral of depth over the foot's profile, m3. */
+/* Returns the integral of depth over the foot's profile of eq. 46, m3. */
 static inline hxReal profile_moment(const hxSoils *soil, hxReal z) {
   const hxReal R = soil->radius, c = R - z;
   const hxMask pad = hx_less(hx_splat(0.0), soil->pad), part = ~pad & hx_less(-R, c);

@@ -165,7 +165,7 @@ static hxNumber tangential_force(const hxModel *model, int row, const hxContactW
     const hxVec3 across = hx_sub3(foot->force, hx_scale(foot->normal.force, foot->kin.normal));
     return hx_lane(hx_sqrt(hx_dot(across, across)), lane);
   }
-  const hxVec3 grip = foot->bristle.grip;
+  const hxVec3 grip = foot->grip.traction;
   return hx_lane(has_bristles(model, row) ? foot->normal.force * hx_sqrt(hx_dot(grip, grip))
                                           : foot->drag * foot->slip_speed,
                  lane);

@@ -254,7 +254,7 @@ static void move_drive(const hxCommand *from, const hxCommand *rate, double elap
       elapsed * (from->speed[joint][slot] + elapsed * (0.5 * a + elapsed * (1.0 / 6.0) * jerk));
 }
 
-/* Returns the command at time t; in kinematic mode drives extrapolate as in eq. 13. */
+/* Returns the command at time t, with drives in kinematic mode as of move_drive. */
 static const hxCommand *command_at(const hxStart *start, double t, hxCommand *now) {
   enum { SIZE = sizeof(hxCommand) / sizeof(double) };
   const double *from = (const double *)start->command, *rate = (const double *)start->ramp;

@@ -43,7 +43,7 @@ typedef struct {
   hxReal drag;               /* N s/m   tangential force over slip speed */
   hxReal drag_per_load;      /* s/m     drag over f_n */
   hxReal stored, hold;       /* J, N/m  of soil: elastic energy, shear without load over bristle */
-  hxBristle bristle;         /* set by laws with bristles only */
+  hxGrip grip;               /* set by laws with bristles only */
   hxVec3 response;           /* N  stage's addition to the force (eq. 20) */
   hxVec3 shift, speed_shift; /* m, m/s  of the contact point (eq. 20), without its a */
   hxVec3 bristle_force;      /* N  bristles' part of response (eq. 21) */
@@ -101,8 +101,8 @@ static inline hxVec3 select3(hxMask mask, hxVec3 a, hxVec3 b) {
   return (hxVec3){hx_select(mask, a.x, b.x), hx_select(mask, a.y, b.y), hx_select(mask, a.z, b.z)};
 }
 
-/* Replaces the normal force of a row by that of soil where it touched down on it (eq. 44, 45). */
-HX_INLINE void soil_load(hxMask soft, const hxSoilPack *f, hxContactWork *contact) {
+/* Replaces the normal force of a row by that of soil where it touched down on it. */
+HX_INLINE void replace_load(hxMask soft, const hxSoilPack *f, hxContactWork *contact) {
   contact->stored = hx_select(
       soft, f->stored, 0.4 * contact->normal.elastic * hx_max(contact->kin.delta, hx_splat(0.0)));
   contact->normal.force = hx_select(soft, f->force, contact->normal.force);
@@ -119,21 +119,21 @@ HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, 
   const hxSoilPack f = hx_soil_pack(state, slot, kin->delta, kin->ddelta, virgin);
   const hxVec3 b = hx_load_vec3(motion->bristle, slot), none = hx_zero3();
   const hxReal zero = hx_splat(0.0), relaxation = f.per_displacement * contact->slip_speed;
-  const hxBristle rigid = has_friction_bristles(model, HX_FOOT)
-                              ? contact->bristle
-                              : (hxBristle){none, none, zero, zero, zero};
+  const hxGrip rigid = has_friction_bristles(model, HX_FOOT)
+                           ? contact->grip
+                           : (hxGrip){none, none, zero, zero, zero};
   const hxVec3 grip = hx_scale(f.per_load, b),
                rate = hx_scale(hx_load(&state->closed[HX_FOOT][slot]),
                                hx_add_scaled(contact->slip, -relaxation, b));
   const hxVec3 force = hx_add_scaled(hx_scale(f.force, hx_sub3(kin->normal, grip)), -f.hold, b);
-  soil_load(soft, &f, contact);
+  replace_load(soft, &f, contact);
   contact->hold = f.hold;
   contact->force = select3(soft, force, contact->force);
-  contact->bristle = (hxBristle){.grip = select3(soft, grip, rigid.grip),
-                                 .rate = select3(soft, rate, rigid.rate),
-                                 .stiffness = hx_select(soft, f.per_load, rigid.stiffness),
-                                 .damping = hx_select(soft, zero, rigid.damping),
-                                 .relaxation = hx_select(soft, relaxation, rigid.relaxation)};
+  contact->grip = (hxGrip){.traction = select3(soft, grip, rigid.traction),
+                           .rate = select3(soft, rate, rigid.rate),
+                           .stiffness = hx_select(soft, f.per_load, rigid.stiffness),
+                           .damping = hx_select(soft, zero, rigid.damping),
+                           .relaxation = hx_select(soft, relaxation, rigid.relaxation)};
 }
 
 /* What is known of contacts before they are computed; NULL: nothing. */
@@ -257,8 +257,8 @@ HX_INLINE void rigid_force(const hxModel *model, int row, int slot, const hxPlan
   if (has_friction_bristles(model, row)) {
     const hxReal closed = contact->law.closed;
     const hxVec3 b = hx_load_vec3(motion->bristle, slot);
-    contact->bristle = hx_friction_grip(model, at, closed, b, contact->slip);
-    contact->force = hx_scale(contact->normal.force, hx_sub3(kin->normal, contact->bristle.grip));
+    contact->grip = hx_friction_grip(model, at, closed, b, contact->slip);
+    contact->force = hx_scale(contact->normal.force, hx_sub3(kin->normal, contact->grip.traction));
     return;
   }
   contact->drag_per_load = hx_friction_drag(model, at, contact->slip_speed);
@@ -289,7 +289,7 @@ static inline hxReal hx_friction_power(const hxModel *model, int row,
                                        const hxContactWork *contact) {
   if (has_soil(model, row)) return -hx_dot(contact->force, contact->slip);
   if (has_friction_bristles(model, row))
-    return contact->normal.force * hx_dot(contact->bristle.grip, contact->slip);
+    return contact->normal.force * hx_dot(contact->grip.traction, contact->slip);
   return contact->drag * contact->slip_speed * contact->slip_speed;
 }
 

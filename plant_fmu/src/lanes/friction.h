@@ -7,12 +7,12 @@
 
 /* Tangential force of a foot with bristles (eq. 16-18, 36, 37). */
 typedef struct {
-  hxVec3 grip;       /* 1    -f_t over f_n */
+  hxVec3 traction;   /* 1    -f_t over f_n */
   hxVec3 rate;       /* m/s  db/dt */
-  hxReal stiffness;  /* 1/m  grip over b (secant) */
-  hxReal damping;    /* s/m  derivative of grip by db/dt */
+  hxReal stiffness;  /* 1/m  traction over b (secant) */
+  hxReal damping;    /* s/m  derivative of traction by db/dt */
   hxReal relaxation; /* 1/s  beta of eq. 21: derivative of db/dt by -b */
-} hxBristle;
+} hxGrip;
 
 /* Moment of spin and rolling friction over the normal force (eq. 38). */
 typedef struct {
@@ -71,8 +71,8 @@ HX_INLINE hxReal hx_friction_drag(const hxModel *model, hxFrictionAt at, hxReal 
  * The friction coefficient falls with the sliding speed p of the bristles: mu(p) = mu + (mu_s -
  * mu)/(1 + (p/v_s)^2) (eq. 18). The viscous part of eq. 35 is added.
  */
-HX_INLINE hxBristle hx_bristle_friction(const hxModel *model, hxFrictionAt at, hxReal closed,
-                                        hxVec3 b, hxVec3 slip) {
+HX_INLINE hxGrip hx_bristle_friction(const hxModel *model, hxFrictionAt at, hxReal closed, hxVec3 b,
+                                     hxVec3 slip) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxNumber per_length = 1.0 / model->presliding;
   const hxVec3 u = hx_scale(hx_splat(per_length), b);
@@ -88,8 +88,8 @@ HX_INLINE hxBristle hx_bristle_friction(const hxModel *model, hxFrictionAt at, h
   const hxReal share = room / hx_sqrt(room * room + hx_dot(d, d) + 1e-30);
   const hxVec3 w = hx_add_scaled(hx_scale(spring, u), share, d);
   const hxReal mu = hx_stribeck_curve(model, at, release_rate * size);
-  return (hxBristle){
-      .grip = hx_add_scaled(hx_scale(mu, w), hx_splat(model->viscous), slip),
+  return (hxGrip){
+      .traction = hx_add_scaled(hx_scale(mu, w), hx_splat(model->viscous), slip),
       .rate = rate,
       .stiffness = (mu * per_length) * spring,
       .damping = (1.5 * mu * model->bristle_damping * per_length) * share + model->viscous,
@@ -100,8 +100,8 @@ HX_INLINE hxBristle hx_bristle_friction(const hxModel *model, hxFrictionAt at, h
 /* The LuGre law (eq. 36, 37): db/dt = v - |v| mu_0/mu(|v|) b/b_max, and the friction over load is
  * mu_0 b/b_max + sigma db/dt + viscous v. sigma falls with the speed, so that the law dissipates
  * and bristles in steady motion keep the force within mu(|v|) f_n. */
-HX_INLINE hxBristle hx_lugre_friction(const hxModel *model, hxFrictionAt at, hxReal closed,
-                                      hxVec3 b, hxVec3 slip) {
+HX_INLINE hxGrip hx_lugre_friction(const hxModel *model, hxFrictionAt at, hxReal closed, hxVec3 b,
+                                   hxVec3 slip) {
   const hxReal rest = at.mu + at.static_rise, stiffness = rest / model->presliding;
   const hxReal still_damping = stiffness * model->bristle_damping;
   const hxReal speed = hx_sqrt(hx_dot(slip, slip));
@@ -110,8 +110,8 @@ HX_INLINE hxBristle hx_lugre_friction(const hxModel *model, hxFrictionAt at, hxR
   const hxReal damping = still_damping / (1.0 + still_damping * speed * per_mu);
   const hxVec3 rate = hx_scale(closed, hx_add_scaled(slip, -release, b));
   const hxVec3 grip = hx_add_scaled(hx_scale(stiffness, b), damping, rate);
-  return (hxBristle){
-      .grip = hx_add_scaled(grip, hx_splat(model->viscous), slip),
+  return (hxGrip){
+      .traction = hx_add_scaled(grip, hx_splat(model->viscous), slip),
       .rate = rate,
       .stiffness = stiffness,
       .damping = damping + model->viscous,
@@ -120,8 +120,8 @@ HX_INLINE hxBristle hx_lugre_friction(const hxModel *model, hxFrictionAt at, hxR
 }
 
 /* Chooses the law of bristles: what a further law needs here is its function above and a case. */
-HX_INLINE hxBristle hx_friction_grip(const hxModel *model, hxFrictionAt at, hxReal closed, hxVec3 b,
-                                     hxVec3 slip) {
+HX_INLINE hxGrip hx_friction_grip(const hxModel *model, hxFrictionAt at, hxReal closed, hxVec3 b,
+                                  hxVec3 slip) {
   return model->friction_law == HX_FRICTION_LUGRE ? hx_lugre_friction(model, at, closed, b, slip)
                                                   : hx_bristle_friction(model, at, closed, b, slip);
 }

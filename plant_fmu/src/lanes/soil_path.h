@@ -33,10 +33,10 @@ HX_RARE void hx_soil_ends(const hxContactState *state, const hxMoment *from, con
   }
 }
 
-/* Returns the normal force of feet and its derivatives, with that of soil in place of the force of
- * rigid ground where they touched down on soil (eq. 44, 45); virgin: as in hx_soil_pack. */
-HX_RARE hxNormalForce with_soil(const hxContactState *state, int slot, hxReal delta, hxReal ddelta,
-                                const hxSoilCurves *virgin, hxNormalForce rigid) {
+/* Returns the normal force of feet and its derivatives: that of rigid ground (eq. 14), or of soil
+ * where they touched down on it (eq. 45); virgin: as in hx_soil_pack. */
+HX_RARE hxNormalForce contact_load(const hxContactState *state, int slot, hxReal delta,
+                                   hxReal ddelta, const hxSoilCurves *virgin, hxNormalForce rigid) {
   const hxReal none = hx_splat(0.0);
   const hxMask soft = hx_on_soil(state, slot), in = hx_in_soil(state, slot);
   hxSoilForces f = {none, none, none, none, none};
@@ -93,7 +93,7 @@ HX_RARE void hx_yield_soil(const hxContactState *state, double h, const hxMoment
     const hxSoilCurves virgin = deepest_virgin(&soil, in, ends, slot, z, hx_load(&a->delta[slot]),
                                                hx_load(&b->delta[slot]));
     hx_store(&plastic[slot],
-             hx_select(in, hx_max(before, hx_plastic_depth(&soil, z, virgin)), before));
+             hx_select(in, hx_max(before, plastic_depth(&soil, z, virgin)), before));
   }
   hx_fill_slots(plastic);
 }

@@ -14,7 +14,7 @@ HX_RARE hxContactSlope with_soil_slope(const hxContactState *state, int slot, hx
   hxContactSlope slope = rigid;
   slope.stiffness = hx_select(soft, ahead.stiffness, rigid.stiffness);
   slope.viscosity = hx_select(soft, ahead.viscosity, rigid.viscosity);
-  const hxReal relaxation = contact->bristle.relaxation, kept = 1.0 + implicit->z * relaxation;
+  const hxReal relaxation = contact->grip.relaxation, kept = 1.0 + implicit->z * relaxation;
   const hxReal bristle = (ahead.force * ahead.per_load + ahead.hold) / kept;
   slope.drag = hx_select(soft, implicit->z * bristle, rigid.drag);
   slope.bristle = hx_select(soft, bristle, rigid.bristle);
@@ -41,9 +41,9 @@ HX_INLINE hxContactSlope contact_slope(const hxModel *model, const hxContactStat
     return has_soil(model, row) ? with_soil_slope(state, slot, deeper, contact, implicit, slope)
                                 : slope;
   }
-  slope.relaxation = contact->bristle.relaxation;
-  slope.bristle = ahead.force * contact->bristle.stiffness / (1.0 + implicit->z * slope.relaxation);
-  slope.drag = ahead.force * contact->bristle.damping + implicit->z * slope.bristle;
+  slope.relaxation = contact->grip.relaxation;
+  slope.bristle = ahead.force * contact->grip.stiffness / (1.0 + implicit->z * slope.relaxation);
+  slope.drag = ahead.force * contact->grip.damping + implicit->z * slope.bristle;
   return has_soil(model, row) ? with_soil_slope(state, slot, deeper, contact, implicit, slope)
                               : slope;
 }
@@ -232,7 +232,7 @@ HX_RARE void torso_response(const hxModel *model, const hxContactState *state,
  * feet (eq. 21). */
 HX_INLINE void bristle_response(const hxImplicit *implicit, int pack, int row, hxLegWork *leg) {
   hxContactWork *contact = &leg->contact[row];
-  const hxVec3 own = hx_scale(hx_splat(implicit->z), contact->bristle.rate);
+  const hxVec3 own = hx_scale(hx_splat(implicit->z), contact->grip.rate);
   const hxVec3 moved =
       implicit->change
           ? hx_add3(hx_load_vec3(implicit->change->motion.bristle, pack * HX_LANES), own)
@@ -314,7 +314,7 @@ static inline hxVec3 stage_bristle_rate(const hxModel *model, const hxContactSta
                                         const hxImplicit *implicit, int pack,
                                         const hxLegWork *leg) {
   const hxContactWork *contact = &leg->contact[HX_FOOT];
-  hxVec3 rate = contact->bristle.rate;
+  hxVec3 rate = contact->grip.rate;
   if (!implicit) return rate;
   const hxMotion6 felt = leg->joint[HX_JOINTS - 1].acceleration;
   const hxVec3 n = contact->kin.normal,

@@ -8,8 +8,8 @@
 static const double landing_sample = 1e-4; /* s  between two samples of a landing's force */
 static const double nearly_sliding = 0.9;  /* 1  of the friction cone */
 
-/* Returns the velocity at x in [0, 1] by the parabola through both ends that has the given mean. */
-static inline hxVec3 sliding(hxVec3 from, hxVec3 to, hxVec3 mean, double x) {
+/* Returns the velocity at x in [0, 1] by the parabola through both ends with this mean (eq. 28). */
+static inline hxVec3 parabola(hxVec3 from, hxVec3 to, hxVec3 mean, double x) {
   const hxVec3 ends = hx_add_scaled(hx_scale(hx_splat(1.0 - x * (4.0 - 3.0 * x)), from),
                                     hx_splat(x * (3.0 * x - 2.0)), to);
   return hx_add_scaled(ends, hx_splat(6.0 * x * (1.0 - x)), mean);
@@ -89,9 +89,9 @@ HX_INLINE hxFootInstant foot_at(const hxPath *path, const hxFootPath *foot, doub
   if (has_shares(path, foot->row)) law.stiffness *= foot->share + x * foot->share_rise;
   hxNormalForce f = hx_normal_force(law, depth.value, approach);
   if (has_soil(path->model, foot->row))
-    f = with_soil(path->contact, foot->slot, depth.value, approach, virgin_at(path, foot->slot, x),
-                  f);
-  const hxVec3 slip = sliding(foot->slip_from, foot->slip_to, foot->mean_slip, x);
+    f = contact_load(path->contact, foot->slot, depth.value, approach,
+                     virgin_at(path, foot->slot, x), f);
+  const hxVec3 slip = parabola(foot->slip_from, foot->slip_to, foot->mean_slip, x);
   return (hxFootInstant){f.force, f.stiffness * approach + f.viscosity * (bends * depth.second),
                          hx_sqrt(hx_dot(slip, slip))};
 }

@@ -23,12 +23,13 @@ typedef struct {
   const hxSoilEnds *ends;   /* set with soil */
 } hxPath;
 
-/* Cubic through values and rates (per step) at both ends, x in [0, 1]: value, first and second
- * derivative. */
+/* A cubic's value, first and second derivative at x. */
 typedef struct {
   hxReal value, rate, second;
 } hxCubic;
 
+/* Returns those of the cubic through values and rates (per step) at both ends, x in [0, 1]
+ * (eq. 28). */
 static inline hxCubic cubic(hxReal from, hxReal slope_from, hxReal rise, hxReal slope_to,
                             hxReal x) {
   const hxReal bend = slope_from + slope_to - 2.0 * rise, curve = rise - slope_from - bend;

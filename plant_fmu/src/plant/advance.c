@@ -82,9 +82,7 @@ static double part_command(hxPlant *plant, const hxStepCall *call, int resumes, 
     for (int i = 0; call->ramp && i < SIZE; ++i) to[i] += elapsed * rate[i];
     command->time = time;
     hx_bus_send(command, &plant->model, state);
-    memset(ramp->angle, 0, sizeof ramp->angle);
-    memset(ramp->speed, 0, sizeof ramp->speed);
-    memset(ramp->torque, 0, sizeof ramp->torque);
+    memset(ramp, 0, HX_JOINT_COMMANDS);
   }
   const double end = hx_bus_end(&plant->model, state, t_end);
   follow_goals(plant, resumes, end, command, ramp);

@@ -113,7 +113,7 @@ static int gear_terms(const hxDefinition *d, int *measured) {
   return stribeck;
 }
 
-/* Copies the constants of the gears' friction (eq. 49, 50). */
+/* Copies the constants of the gears' friction. */
 static void compile_gear(hxModel *model, const hxDefinition *d) {
   model->stribeck = gear_terms(d, &model->measured_friction);
   model->coulomb_friction = d->servo.coulomb_friction;

@@ -74,7 +74,7 @@ HX_API void hx_probe_soil(const hxSoilDefinition *definition, const double *row,
   const hxSoilForces f = hx_soil_normal_force(&soils, p, at, hx_splat(dz), virgin);
   const hxReal result[10] = {virgin.force,
                              virgin.slope,
-                             hx_plastic_depth(&soils, at, virgin),
+                             plastic_depth(&soils, at, virgin),
                              f.force,
                              f.elastic,
                              f.stiffness,
@@ -170,10 +170,10 @@ HX_API void hx_probe_sliding(const hxPlant *plant, const double slip[3], const d
   const hxReal one = hx_splat(1.0), zero = hx_splat(0.0);
   const hxFrictionAt at = {hx_splat(model->mu), hx_splat(model->static_rise)};
   const hxReal drag = hx_friction_drag(model, at, hx_sqrt(hx_dot(v, v)));
-  hxBristle f = {hx_scale(drag, v), hx_zero3(), zero, drag, zero};
+  hxGrip f = {hx_scale(drag, v), hx_zero3(), zero, drag, zero};
   if (hx_friction_kind(model->friction_law).has_bristles)
     f = hx_friction_grip(model, at, one, z, v);
-  put3(f.grip, 0, out), put3(f.rate, 0, out + 3);
+  put3(f.traction, 0, out), put3(f.rate, 0, out + 3);
   out[6] = hx_lane(f.stiffness, 0), out[7] = hx_lane(f.damping, 0),
   out[8] = hx_lane(f.relaxation, 0);
 }
