@@ -138,10 +138,9 @@ def check_constants(own: Mapping[str, Any], where: str) -> None:
     for key in ("voltage", "torque_constant", "resistance"):
         if not own.get(key, 0.0) > 0.0:
             what = "a motor without its constants"
-            got = own.get(key)
-            expected = "a number > 0"
+            got, at = own.get(key), f"{where}.{key}"
             fix = f"give {key}, or a servo of `hexapod list servos` as {MODEL}"
-            raise RobotError(what, got=got, expected=expected, fix=fix, where=f"{where}.{key}")
+            raise RobotError(what, got=got, expected="a number > 0", fix=fix, where=at)
 
 
 def refuse_others(given: Mapping[str, Any], derived: Mapping[str, Any], where: str) -> None:
@@ -159,9 +158,7 @@ def refuse_others(given: Mapping[str, Any], derived: Mapping[str, Any], where: s
 
 
 def followed(servo: Servo) -> Servo:
-    """Returns a servo of the drive motor with torque_max, speed_max and motor_constant that follow
-    from its constants.
-    """
+    """Returns a servo of the drive motor whose fields of FOLLOWING follow from its constants."""
     return replace(
         servo,
         torque_max=stall_torque(servo),
