@@ -36,8 +36,7 @@ def _cell(coordinate: float, count: int) -> int:
 
 def block_height(surface: Surface, x: float, y: float) -> float:
     """Returns the height [m] of the block at (x, y)."""
-    row = _cell((y - surface.y0) / surface.cell, surface.rows)
-    return float(surface.height[row, _cell((x - surface.x0) / surface.cell, surface.columns)])
+    return float(surface.height[cell_at(surface, x, y)])
 
 
 def block_heights(surface: Surface, x: Array, y: Array) -> Array:
@@ -111,8 +110,8 @@ def _neighbour(surface: Surface, point: Array, cell: Cell, way: Cell) -> tuple[f
     """Returns distance [m] and normal (3,) of the neighbouring column of a cell along `way`."""
     (row, column), (dr, dc) = cell, way
     top = _column(surface, row + dr, column + dc)
-    gap_x = _gap(float(point[0]), surface.x0 + surface.cell * column, surface.cell, dc)
-    gap_y = _gap(float(point[1]), surface.y0 + surface.cell * row, surface.cell, dr)
+    gap_x = gap_to(float(point[0]), surface.x0 + surface.cell * column, surface.cell, dc)
+    gap_y = gap_to(float(point[1]), surface.y0 + surface.cell * row, surface.cell, dr)
     above = float(point[2]) - top
     if dr and dc:
         away = np.array([-dc * max(gap_x, 0.0), -dr * max(gap_y, 0.0), max(above, 0.0)])
@@ -127,6 +126,6 @@ def _neighbour(surface: Surface, point: Array, cell: Cell, way: Cell) -> tuple[f
     return distance, away / distance if distance > 0.0 else back / np.linalg.norm(back)
 
 
-def _gap(coordinate: float, low: float, size: float, way: int) -> float:
-    """Returns the gap [m] to the neighbour on one side of a cell from `low` on, 0 along it."""
+def gap_to(coordinate: float, low: float, size: float, way: int) -> float:
+    """Returns the gap (eq. 34) [m] to the neighbour on one side of a cell from `low` on."""
     return low + size - coordinate if way > 0 else coordinate - low if way < 0 else 0.0

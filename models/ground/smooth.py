@@ -29,7 +29,7 @@ CATMULL_ROM = 0.5 * np.array(
 )
 
 
-def _place(coordinate: float, count: int) -> tuple[int, float, float]:
+def grid_place(coordinate: float, count: int) -> tuple[int, float, float]:
     """Returns the cell of a grid coordinate, the place in it from 0 to 1, and how far the
     coordinate is beyond the map, in cells: positive behind its last node, negative before its first
     one.
@@ -46,10 +46,10 @@ def _with_ghosts(values: Array, cell: int, count: int) -> Array:
     return np.stack([before, values[cell], values[cell + 1], behind])
 
 
-def _weights(t: float, beyond: float, cell: float) -> tuple[Array, Array, Array]:
-    """Returns the four weights at t, and their first and second derivatives by t.
+def cubic_weights(t: float, beyond: float, cell: float) -> tuple[Array, Array, Array]:
+    """Returns the four weights at t (eq. 32), and their first and second derivatives by t.
 
-    beyond: as in `_place`; cell: spacing of the nodes [m].
+    beyond: as in `grid_place`; cell: spacing of the nodes [m].
     """
     value = CATMULL_ROM @ np.array([1.0, t, t * t, t**3])
     first = CATMULL_ROM @ np.array([0.0, 1.0, 2.0 * t, 3.0 * t * t])
@@ -63,13 +63,13 @@ def _weights(t: float, beyond: float, cell: float) -> tuple[Array, Array, Array]
 
 def height_and_slopes(surface: Surface, x: float, y: float) -> tuple[float, Array, Array]:
     """Returns the height [m] at (x, y), its gradient (2,) and its Hessian (2, 2) [1/m]."""
-    column, t, beyond_x = _place((x - surface.x0) / surface.cell, surface.columns)
-    row, u, beyond_y = _place((y - surface.y0) / surface.cell, surface.rows)
+    column, t, beyond_x = grid_place((x - surface.x0) / surface.cell, surface.columns)
+    row, u, beyond_y = grid_place((y - surface.y0) / surface.cell, surface.rows)
     band = surface.height[max(row - 1, 0) : row + 3]
     nodes = _with_ghosts(band, row - max(row - 1, 0), len(band))
     nodes = _with_ghosts(nodes.T, column, surface.columns).T  # (4, 4) rows along y
-    a, da, dda = _weights(t, beyond_x, surface.cell)
-    b, db, ddb = _weights(u, beyond_y, surface.cell)
+    a, da, dda = cubic_weights(t, beyond_x, surface.cell)
+    b, db, ddb = cubic_weights(u, beyond_y, surface.cell)
     da, db = da / surface.cell, db / surface.cell
     dda, ddb = dda / surface.cell**2, ddb / surface.cell**2
     gradient = np.array([b @ nodes @ da, db @ nodes @ a])
@@ -88,8 +88,8 @@ def node_weights(coordinates: Array, count: int, size: float) -> Array:
     """
     weights = np.zeros((len(coordinates), count + 2))  # with a ghost at each end
     for row, coordinate in enumerate(coordinates.tolist()):
-        cell, t, beyond = _place(coordinate, count)
-        weights[row, cell : cell + 4] = _weights(t, beyond, size)[0]
+        cell, t, beyond = grid_place(coordinate, count)
+        weights[row, cell : cell + 4] = cubic_weights(t, beyond, size)[0]
     inner = weights[:, 1:-1]
     inner[:, :2] += weights[:, :1] * np.array([2.0, -1.0])
     inner[:, -2:] += weights[:, -1:] * np.array([-1.0, 2.0])

@@ -1,8 +1,7 @@
 /* plant.c - a plant's life: create, reset, output, destroy. plant/ has the rest.
  *
- * A macro-step is hx_plant_step in plant/advance.c. It checks the input, applies locks of joints,
- * computes the part's command (bus, firmware, supply), integrates with the kernel to the part's
- * end, and counts the overload. If a part fails, the state before the call is restored.
+ * A macro-step is hx_plant_step in plant/advance.c. state.h says what it writes, in which order. If
+ * a part of it fails, the state before the call is restored.
  */
 #include <math.h>
 #include <stdint.h>

@@ -203,29 +203,30 @@ typedef struct hxFirmware {
   double angle[HX_JOINTS][HX_SLOTS];  /* rad    setpoints at the last command (eq. 57), */
   double rate[HX_JOINTS][HX_SLOTS];   /* rad/s  their speed since, */
   double time;                        /* s      and its time */
-  double loaded[HX_JOINTS][HX_SLOTS]; /* s  of a duty above the overload limit (eq. 58), with the
-                                       *    sign of the duty */
+  double loaded[HX_JOINTS][HX_SLOTS]; /* s      of a duty above the overload limit (eq. 58), with
+                                       *        the sign of the duty */
 } hxFirmware;
 
-/* State of the contacts. It changes at touch-down and lift-off, plastic depth and nearest points at
- * the end of steps; never within a step. */
+/* State of the contacts. It changes between steps alone. */
 typedef struct hxContactState {
-  double closed[HX_ROWS][HX_SLOTS];       /* 1 from touch-down to lift-off, else 0 */
-  double damping[HX_ROWS][HX_SLOTS];      /* s/m  d of eq. 14, fixed at touch-down */
-  double impact_speed[HX_ROWS][HX_SLOTS]; /* m/s  at the last touch-down */
+  /* contact_law.c: at touch-down; lift-off sets closed and damping to 0 */
+  double closed[HX_ROWS][HX_SLOTS];       /* 1        1 from touch-down to lift-off, else 0 */
+  double damping[HX_ROWS][HX_SLOTS];      /* s/m      d of eq. 14 */
+  double impact_speed[HX_ROWS][HX_SLOTS]; /* m/s      approach speed at the last touch-down */
   double stiffness[HX_ROWS][HX_SLOTS];    /* N/m^1.5  K of the ground where it touched down */
   double mu[HX_ROWS][HX_SLOTS];           /* 1        friction of that ground */
   double static_rise[HX_ROWS][HX_SLOTS];  /* 1        mu_s - mu of eq. 18 */
-  double on_soil[HX_SLOTS];               /* 1    1: the foot touched down on soil */
+  double on_soil[HX_SLOTS];               /* 1        1: the foot touched down on soil */
   double soil[HX_SOIL_SIZE][HX_SLOTS];    /* numbers of an hxSoil, where on_soil is 1 */
-  /* m  depth at which feet touch soil: z_p, or that of the footprint above which one is; 0 on
-   *    rigid ground */
-  double plastic[HX_SLOTS];
-  double place[2][HX_SLOTS];   /* m  x and y where they left the bottom of that footprint */
-  double cell[2][HX_SLOTS];    /* 1    blocks: column and row over which a foot is; < 0: not held */
+  /* lanes/soil_path.h: at the end of every step on soil */
+  double plastic[HX_SLOTS];  /* m  depth at which feet touch soil: z_p, or that of the footprint
+                              *    above which one is; 0 on rigid ground */
+  double place[2][HX_SLOTS]; /* m  x and y where they left the bottom of that footprint */
+  /* contact_law.c: at touch-down, and where a foot leaves its cell */
+  double cell[2][HX_SLOTS]; /* 1  blocks: column and row over which a foot is; < 0: not held */
+  /* kernels/integrator.h: at the end of every step */
   double nearest[2][HX_SLOTS]; /* m  smooth grids: x and y from a foot's centre to the point nearest
-                                *    to it at the start of a step, where the search for that point
-                                *    begins; 0 between calls */
+                                *    to it, where the next search begins; 0 between calls */
 } hxContactState;
 
 /* Penetration and approach speed of all contacts; only the model's rows are set. */
@@ -276,48 +277,65 @@ enum { HX_RISE_SAMPLES = 10 }; /* samples in the rise window of 1 ms */
 
 /* Integrals and peaks along the path of the steps, since the start unless stated otherwise. */
 typedef struct hxMeasured {
+  /* measure/joint_measure.h */
   double positive_work[HX_JOINTS][HX_SLOTS];  /* J       where motors drive */
   double negative_work[HX_JOINTS][HX_SLOTS];  /* J       where motors brake, >= 0 */
   double torque_squared[HX_JOINTS][HX_SLOTS]; /* N2 m2 s integral of squared motor torque */
-  double slip_distance[HX_SLOTS];             /* m       slip of feet under load */
-  double impulse[HX_SLOTS];                   /* N s     integral of the normal force */
-  double peak_force[HX_SLOTS];                /* N       largest force of the last call */
-  double peak_rate[HX_SLOTS];                 /* N/s     steepest rise in the last call */
-  double landing_rate[HX_SLOTS]; /* N/s     largest rise of the last landing (eq. 29) */
+  /* measure/foot_measure.h; moment.h begins a landing and resets the peaks of a call */
+  double slip_distance[HX_SLOTS]; /* m       slip of feet under load */
+  double impulse[HX_SLOTS];       /* N s     integral of the normal force */
+  double peak_force[HX_SLOTS];    /* N       largest force of the last call */
+  double peak_rate[HX_SLOTS];     /* N/s     steepest rise in the last call */
+  double landing_rate[HX_SLOTS];  /* N/s     largest rise of the last landing (eq. 29) */
   double landing_force[HX_RISE_SAMPLES][HX_SLOTS]; /* N       ring buffer of a landing's forces */
-  double landing_left[HX_SLOTS];                 /* 1       samples of the landing still to take */
-  double landed_at[HX_SLOTS];                    /* s       time of the last touch-down */
-  double landings[HX_SLOTS];                     /* 1       touch-downs */
-  double winding[HX_JOINTS][HX_SLOTS];           /* K       temperatures of windings */
-  double housing[HX_JOINTS][HX_SLOTS];           /* K       of housings */
-  double contact_loss, friction_loss, gear_loss; /* J  their sum is the dissipated energy; stops
-                                                  *    count with the gears */
-  double cone_time[HX_CONE_BINS]; /* s  feet under load, by share of the friction cone */
+  double landing_left[HX_SLOTS]; /* 1       samples of the landing still to take */
+  double landed_at[HX_SLOTS];    /* s       time of the last touch-down */
+  double landings[HX_SLOTS];     /* 1       touch-downs */
+  /* measure/joint_measure.h (eq. 52) */
+  double winding[HX_JOINTS][HX_SLOTS]; /* K       temperatures of windings */
+  double housing[HX_JOINTS][HX_SLOTS]; /* K       of housings */
+  /* measure/measure.h */
+  double contact_loss, friction_loss, gear_loss; /* J       their sum is the dissipated energy;
+                                                  * stops count with the gears */
+  /* measure/foot_measure.h (eq. 30) */
+  double cone_time[HX_CONE_BINS]; /* s       feet under load, by share of the friction cone */
 } hxMeasured;
 
 enum { HX_MEASURED_LINES = offsetof(hxMeasured, contact_loss) / (HX_SLOTS * sizeof(double)) };
 
+/* State of a plant. A call of hx_plant_step writes in this order
+ *   locked, held                      plant/locks.c
+ *   in each part of the call, from one transmission of the bus to the next:
+ *     bus, firmware                   command/command.c: hx_bus_send, hx_follow_goals
+ *     supply, duty                    command/command.c: hx_supply_power
+ *     in each step, by advance() of kernels/integrator.h:
+ *       evaluations, rejected         kernels/step.h: trials until the error is small enough
+ *       next_step, first_step         the error control
+ *       measured, plastic, moment     measure/: from the old moment to that of the step's end
+ *       motion, steps, time
+ *       contact, touchdowns           measure/moment.h: switches the contacts that are due
+ *     firmware.loaded                 command/command.c: hx_count_overload
+ *     call_start, call_input          plant/advance.c */
 typedef struct hxState {
   double time;                      /* s */
   double next_step;                 /* s  step that the error control proposes next */
   double first_step;                /* s  the same for a call's first step, with new inputs */
   double stored_at_start;           /* J  stored energy at the start of the energy audit */
-  double parameter_work;            /* J  given by changes of parameters since */
+  double parameter_work;            /* J  given by changes of parameters since (plant/tune.c) */
   double call_start;                /* s  start of the call that an event interrupted */
   double call_input;                /* 1  checksum of its input, a whole number; 0: no such call */
   double call_evaluations;          /* 1  evaluations before the last call began */
   double supply;                    /* 1  hxCommand.supply of the last call, */
   double duty[HX_JOINTS][HX_SLOTS]; /* 1    and its duty */
-  double locked[HX_JOINTS][HX_SLOTS];              /* 1    1: the joint is locked (plant/locks.c) */
-  double held[HX_JOINTS][HX_SLOTS];                /* rad  where it was locked */
-  hxBus bus;                                       /* by command/command.c, as the next */
-  hxFirmware firmware;                             /* by command/command.c */
-  hxPlantMotion motion;                            /* by kernels/step.h */
-  hxContactState contact;                          /* by contact_law.c */
+  double locked[HX_JOINTS][HX_SLOTS]; /* 1    1: the joint is locked */
+  double held[HX_JOINTS][HX_SLOTS];   /* rad  where it was locked */
+  hxBus bus;
+  hxFirmware firmware;
+  hxPlantMotion motion;
+  hxContactState contact;
   double evaluations, steps, rejected, touchdowns; /* 1  counts since the start */
-  hxMeasured measured;                             /* by measure/ */
-  hxMoment moment; /* by measure/moment.h: end of the last step; hx_copy_state() copies what is
-                    * before it */
+  hxMeasured measured;
+  hxMoment moment;       /* end of the last step; hx_copy_state() copies what is before it */
   hxCompleted completed; /* by plant/continuous.c, model exchange: end of the last step */
 } hxState;
 
@@ -352,12 +370,6 @@ static inline int hx_is_wall(int row) { return row >= HX_WALL && row < HX_KNEE; 
 
 /* Returns whether a row's contacts are those of pairs of legs. */
 static inline int hx_is_of_pair(int row) { return row >= HX_PAIR; }
-
-/* Makes the penetrations of feet relative to the depth at which they touch the ground. */
-static inline void hx_depths_on_soil(const hxContactState *contact, hxDepths *depths) {
-  for (int slot = 0; slot < HX_SLOTS; ++slot)
-    depths->delta[HX_FOOT][slot] -= contact->plastic[slot];
-}
 
 /* Returns how many slots of a row of contacts hold one. */
 static inline int hx_slots_of(int row) { return row == HX_TORSO ? HX_SLOTS : HX_LEGS; }

@@ -130,8 +130,8 @@ HX_RARE hxGround hx_smooth_grid(const hxModel *model, const hxContactState *stat
     hx_forget_nodes(&own);
     nodes = &own;
   }
-  const hxNearest nearest = hx_nearest_on_surface(model->terrain, wanted, at, from, 0, nodes);
-  const hxReal exact = hx_distance_from_surface(&nearest, at, normal);
+  const hxNearest nearest = hx_nearest_point(model->terrain, wanted, at, from, 0, nodes);
+  const hxReal exact = hx_smooth_distance(&nearest, at, normal);
   return (hxGround){hx_select(wanted, exact, distance),
                     {hx_select(wanted, normal[0], zero), hx_select(wanted, normal[1], zero),
                      hx_select(wanted, normal[2], one)}};

@@ -19,7 +19,7 @@ typedef struct {
 static inline hxNumber number_root(hxNumber x) { return hx_lane(hx_sqrt(hx_splat(x)), 0); }
 
 /* Returns G_ij = (n_i . n_j) phi(|n_i - n_j|/rho); reach: 1/rho^2. */
-static inline hxNumber sharing_overlap(const hxNumber a[3], const hxNumber b[3], hxNumber reach) {
+static inline hxNumber overlap(const hxNumber a[3], const hxNumber b[3], hxNumber reach) {
   hxNumber square = 0.0;
   for (int i = 0; i < 3; ++i) square += (a[i] - b[i]) * (a[i] - b[i]);
   if (hx_re(square * reach) >= 1.0) return 0.0;
@@ -73,7 +73,7 @@ static inline int share_a_spot(const hxSharers *of, double radius,
   for (int i = 0; i < of->count; ++i) {
     G[i][i] = 1.0;
     for (int j = 0; j < i; ++j) {
-      G[i][j] = G[j][i] = sharing_overlap(of->normal[i], of->normal[j], reach);
+      G[i][j] = G[j][i] = overlap(of->normal[i], of->normal[j], reach);
       found |= hx_re(G[i][j]) != 0.0;
     }
   }
@@ -96,7 +96,8 @@ static inline void share_between_two(const hxNumber depth[2], hxNumber G, hxNumb
 
 /* Computes the shares of contacts: of all choices that only push, that with the largest lambda .
  * delta is the solution. */
-static inline void hx_shares(const hxSharers *of, double radius, hxNumber share[HX_SHARERS]) {
+static inline void hx_contact_shares(const hxSharers *of, double radius,
+                                     hxNumber share[HX_SHARERS]) {
   hxNumber G[HX_SHARERS][HX_SHARERS];
   double best = -1.0;
   for (int i = 0; i < of->count; ++i) share[i] = 1.0;

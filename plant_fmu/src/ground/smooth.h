@@ -62,7 +62,7 @@ static inline hxGridPlace grid_place(hxReal x, double origin, double per_cell, i
   return (hxGridPlace){node, clamped - node, u - clamped, outside};
 }
 
-/* Computes weights of four nodes by Catmull and Rom's cubic, and their derivatives by the place. */
+/* Computes the weights w of four nodes (eq. 32), and their first and second derivatives. */
 static inline void cubic_weights(hxReal t, hxReal w[3][4]) {
   const hxReal t2 = t * t, t3 = t2 * t;
   w[0][0] = -0.5 * t + t2 - 0.5 * t3, w[0][1] = 1.0 - 2.5 * t2 + 1.5 * t3;
@@ -161,8 +161,8 @@ static inline void move_stencil(const hxTerrain *terrain, hxMask active, hxReal 
   if (hx_any(moved)) change_nodes(terrain, active, moved, at);
 }
 
-/* Computes the surface over the points of a stencil. */
-static inline hxPatch patch_at(const hxTerrain *terrain, const hxStencil *at) {
+/* Computes the height of the surface over the points of a stencil, and its derivatives (eq. 32). */
+static inline hxPatch height_and_slopes(const hxTerrain *terrain, const hxStencil *at) {
   const hxPatchNodes *of = at->of;
   hxReal wx[3][4], wy[3][4], line[3][4], sum[3][3]; /* sum: [derivatives by y][by x] */
   cubic_weights(at->x.place, wx);
@@ -307,7 +307,8 @@ static inline hxMask find_by_kept_patches(const hxTerrain *terrain, hxMask wante
 static inline void use_points_below(const hxTerrain *terrain, hxMask mask, const hxReal point[3],
                                     hxStencil *at, hxNearest *found) {
   move_stencil(terrain, mask, point[0], point[1], at);
-  replace_nearest(mask, (hxNearest){point[0], point[1], patch_at(terrain, at), found->H}, found);
+  replace_nearest(mask, (hxNearest){point[0], point[1], height_and_slopes(terrain, at), found->H},
+                  found);
 }
 
 /* Replaces the nearest points of the lanes `active` by those of Newton's method from (x, y). */
@@ -320,7 +321,7 @@ static inline void search_nearest(const hxTerrain *terrain, hxMask active, const
   at.of = nodes;
   move_stencil(terrain, active, x, y, &at);
   for (int i = 0;; ++i) {
-    const hxPatch p = patch_at(terrain, &at);
+    const hxPatch p = height_and_slopes(terrain, &at);
     const hxMove move = move_from(&p, x, y, point);
     hxMask done = ~hx_less(hx_splat(closest * area), move.square);
     if (!exactly) {
@@ -343,12 +344,12 @@ static inline void search_nearest(const hxTerrain *terrain, hxMask active, const
 }
 
 /* Computes the nearest points of a smooth surface to the lanes `wanted` by Newton's method on
- * their two parameters, from the points below moved by `start`. With `exactly`, also the second
- * derivatives belong to the nearest point. `nodes` are those of an earlier search on the same
- * terrain, or empty. */
-static inline hxNearest hx_nearest_on_surface(const hxTerrain *terrain, hxMask wanted,
-                                              const hxReal point[3], const hxReal start[2],
-                                              int exactly, hxPatchNodes *nodes) {
+ * their two parameters (eq. 33), from the points below moved by `start`. With `exactly`, also the
+ * second derivatives belong to the nearest point. `nodes` are those of an earlier search on the
+ * same terrain, or empty. */
+static inline hxNearest hx_nearest_point(const hxTerrain *terrain, hxMask wanted,
+                                         const hxReal point[3], const hxReal start[2], int exactly,
+                                         hxPatchNodes *nodes) {
   const hxReal zero = hx_splat(0.0);
   hxNearest found = {zero, zero, {zero, zero, zero, zero, zero, zero}, {zero, zero, zero, zero}};
   const hxMask known = find_by_kept_patches(terrain, wanted, point, nodes, &found),
@@ -359,10 +360,10 @@ static inline hxNearest hx_nearest_on_surface(const hxTerrain *terrain, hxMask w
   return found;
 }
 
-/* Returns the signed distance of points from the surface at their nearest points, and sets the
- * normals there. */
-static inline hxReal hx_distance_from_surface(const hxNearest *at, const hxReal point[3],
-                                              hxReal normal[3]) {
+/* Returns the signed distance of points from the surface at their nearest points (eq. 31), and sets
+ * the normals there. */
+static inline hxReal hx_smooth_distance(const hxNearest *at, const hxReal point[3],
+                                        hxReal normal[3]) {
   const hxPatch *p = &at->p;
   const hxReal per_n = 1.0 / hx_sqrt(1.0 + p->sx * p->sx + p->sy * p->sy);
   normal[0] = -p->sx * per_n, normal[1] = -p->sy * per_n, normal[2] = per_n;

@@ -307,8 +307,8 @@ static void smooth_face(const hxTerrain *terrain, const double point[3], int ben
   const double below[2] = {0.0, 0.0};
   hxPatchNodes nodes;
   hx_forget_nodes(&nodes);
-  const hxNearest nearest = hx_nearest_on_surface(terrain, -1, point, below, bends, &nodes);
-  face->distance = hx_distance_from_surface(&nearest, point, face->normal);
+  const hxNearest nearest = hx_nearest_point(terrain, -1, point, below, bends, &nodes);
+  face->distance = hx_smooth_distance(&nearest, point, face->normal);
   if (bends) set_bend(&nearest.p, &nearest.H, face);
 }
 
@@ -341,8 +341,7 @@ double hx_terrain_outside(const hxTerrain *terrain, const double point[3], const
 typedef struct {
   double col, row, own; /* 1, 1, m */
   const double *height; /* of its own top, in the grid */
-  int64_t left, right;  /* from it to the heights beside it */
-  int64_t below, above; /* along y */
+  int64_t x[3], y[3];   /* from it to the heights at offsets -1, 0, 1 along x and y */
 } hxCellAt;
 
 static void set_cell(const hxTerrain *terrain, const double cell[2], hxCellAt *at) {
@@ -351,22 +350,18 @@ static void set_cell(const hxTerrain *terrain, const double cell[2], hxCellAt *a
   at->col = cell[0], at->row = cell[1];
   at->height = terrain->height + r * head->cols + c;
   at->own = *at->height;
-  at->left = c > 0 ? -1 : 0, at->right = c < head->cols - 1 ? 1 : 0;
-  at->below = r > 0 ? -head->cols : 0, at->above = r < head->rows - 1 ? head->cols : 0;
+  at->x[0] = c > 0 ? -1 : 0, at->x[1] = 0, at->x[2] = c < head->cols - 1 ? 1 : 0;
+  at->y[0] = r > 0 ? -head->cols : 0, at->y[1] = 0;
+  at->y[2] = r < head->rows - 1 ? head->cols : 0;
 }
 
 /* Returns the height of the top of the cell at offsets -1, 0 or 1. */
 static double top_beside(const hxCellAt *at, int i, int j) {
-  return at->height[(i < 0   ? at->left
-                     : i > 0 ? at->right
-                             : 0) +
-                    (j < 0   ? at->below
-                     : j > 0 ? at->above
-                             : 0)];
+  return at->height[at->x[1 + i] + at->y[1 + j]];
 }
 
-/* Returns the gap between a point and the column at offset -1, 0 or 1 from the cell along an axis,
- * 0 for an offset of 0. */
+/* Returns the gap (eq. 34) between a point and the column at offset -1, 0 or 1 from the cell along
+ * an axis, 0 for an offset of 0. */
 static double gap_to(double x, double origin, double size, double cell, int offset) {
   const double low = origin + size * cell;
   return offset > 0 ? low + size - x : offset < 0 ? x - low : 0.0;

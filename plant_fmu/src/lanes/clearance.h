@@ -61,11 +61,6 @@ static inline hxNearestShares hx_nearest_shares(hxVec3 apart, hxVec3 a, hxVec3 b
   return nearest;
 }
 
-/* Returns the distance between these lines. */
-static inline hxReal hx_line_distance(hxVec3 p, hxVec3 a, hxVec3 q, hxVec3 b) {
-  return hx_sqrt(hx_nearest_shares(hx_sub3(p, q), a, b).square);
-}
-
 /* Stores the points of a pack of legs, world axes. */
 static inline void leg_chain(const hxModel *model, const hxPlantMotion *motion, int slot,
                              hxMat3 R_WF, hxMat3 R_WS, hxNumber chain[HX_CHAIN][3][HX_SLOTS]) {
@@ -114,7 +109,8 @@ static inline void hx_clearances(const hxModel *model, const hxPlantMotion *moti
         const hxVec3 p = chain_point(chain[i], slot), q = chain_point(next[j], slot);
         const hxVec3 a = hx_sub3(chain_point(chain[i + 1], slot), p),
                      b = hx_sub3(chain_point(next[j + 1], slot), q);
-        least = hx_min(least, hx_line_distance(p, a, q, b) - (radius[i] + radius[j]));
+        const hxReal distance = hx_sqrt(hx_nearest_shares(hx_sub3(p, q), a, b).square);
+        least = hx_min(least, distance - (radius[i] + radius[j]));
       }
     hx_store(&gap[slot], least);
   }
@@ -158,9 +154,10 @@ HX_RARE void leg_lines(const hxModel *model, const hxPlantMotion *motion, hxLegL
 static inline int own_line(int row) { return (row - HX_PAIR) / HX_LINES; }
 static inline int next_line(int row) { return (row - HX_PAIR) % HX_LINES; }
 
-/* Computes a row of contacts between legs: the normal points from the next leg's line to the leg's,
- * the point is in the middle of the overlap, the velocity is that of the leg's material relative to
- * the next leg's; *next_arm: from the centre of mass of the next leg's body to the point, m. */
+/* Computes a row of contacts between legs (eq. 56): the normal points from the next leg's line to
+ * the leg's, the point is in the middle of the overlap, the velocity is that of the leg's material
+ * relative to the next leg's; *next_arm: from the centre of mass of the next leg's body to the
+ * point, m. */
 static inline hxContactKinematics pair_contact(const hxModel *model, hxLegLines *own,
                                                hxLegLines *next, int row, int slot,
                                                hxVec3 *next_arm) {
@@ -214,9 +211,9 @@ static inline void add_pair_forces(int row, const hxVec3 next_arm[HX_PACKS], hxW
   }
 }
 
-/* Computes all contacts between legs and what they exert on femurs and tibias. */
-HX_RARE void hx_pair_forces(const hxModel *model, const hxContactState *state,
-                            const hxPlantMotion *motion, hxWork *work) {
+/* Computes all contacts between legs and what they exert on femurs and tibias (eq. 56). */
+HX_RARE void hx_pair_wrenches(const hxModel *model, const hxContactState *state,
+                              const hxPlantMotion *motion, hxWork *work) {
   hxLegLines own, next;
   leg_lines(model, motion, &own, &next);
   for (int pack = 0; pack < HX_PACKS; ++pack)

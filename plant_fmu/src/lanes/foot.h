@@ -242,7 +242,7 @@ HX_RARE void hx_foot_shares(const hxModel *model, const hxContactState *state, i
     ++of.count;
   }
   if (of.count < 2) return;
-  hx_shares(&of, hx_re(model->radius[HX_FOOT]), found);
+  hx_contact_shares(&of, hx_re(model->radius[HX_FOOT]), found);
   for (int i = 0; i < of.count; ++i) share[row_of[i]] = found[i];
 }
 

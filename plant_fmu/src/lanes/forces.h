@@ -324,7 +324,7 @@ HX_RARE void leg_pairs(const hxModel *model, const hxContactState *state,
     for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
       work->pair_rows |= all || is_used(state, row, slot);
   if (!work->pair_rows) return;
-  hx_pair_forces(model, state, motion, work);
+  hx_pair_wrenches(model, state, motion, work);
   for (int pack = 0; pack < HX_PACKS; ++pack)
     for (int line = 0; line < HX_LINES; ++line)
       push_link(&work->pack[pack].joint[1 + line], &work->pack[pack].by_legs[line]);

@@ -196,7 +196,7 @@ HX_RARE void places_on_grid(const hxModel *model, const hxContactState *state,
   }
 }
 
-/* Copies penetration and approach speed of all contacts. */
+/* Copies approach speeds and penetrations, those of feet below the depth where they touch soil. */
 static inline void hx_depths_of_moment(const hxModel *model, const hxContactState *state,
                                        const hxMoment *moment, hxDepths *depths) {
   for (int k = 0; k < model->listed; ++k) {
@@ -204,7 +204,8 @@ static inline void hx_depths_of_moment(const hxModel *model, const hxContactStat
     memcpy(depths->delta[model->row[k]], contact->delta, sizeof contact->delta);
     memcpy(depths->ddelta[model->row[k]], contact->ddelta, sizeof contact->ddelta);
   }
-  if (model->has_soil) hx_depths_on_soil(state, depths);
+  for (int slot = 0; model->has_soil && slot < HX_SLOTS; ++slot)
+    depths->delta[HX_FOOT][slot] -= state->plastic[slot];
   if (model->terrain) places_on_grid(model, state, moment, depths);
 }
 

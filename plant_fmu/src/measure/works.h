@@ -15,11 +15,6 @@ typedef struct {
   hxNumber torso_contact, torso_friction;
 } hxStepWorks;
 
-/* Returns the mean of two values. */
-static inline hxReal mean_of(const double *from, const double *to) {
-  return 0.5 * (hx_load(from) + hx_load(to));
-}
-
 static inline hxVec3 mean_vec3(const double (*from)[HX_SLOTS], const double (*to)[HX_SLOTS],
                                int slot) {
   return hx_scale(hx_splat(0.5), hx_add3(hx_load_vec3(from, slot), hx_load_vec3(to, slot)));
@@ -113,7 +108,7 @@ HX_RARE void add_pair_works(const hxPath *path, const hxImpulses *impulse, hxSte
 
 /* Returns the mean of a joint's speeds at both ends, rad/s. */
 static inline hxReal mean_speed(const hxPath *path, int joint, int slot) {
-  return mean_of(&path->from->speed[joint][slot], &path->to->speed[joint][slot]);
+  return 0.5 * (hx_load(&path->from->speed[joint][slot]) + hx_load(&path->to->speed[joint][slot]));
 }
 
 /* Adds what the stops of a pack of legs lose in a step: their work on the joints less what they

@@ -15,8 +15,8 @@ static void put_nearest(const hxTerrain *terrain, const double point[3], hxPatch
   const hxReal start[2] = {hx_splat(0.0), hx_splat(0.0)};
   const hxMask wanted = hx_less(hx_splat(0.0), hx_splat(1.0));
   hxReal normal[3];
-  const hxNearest nearest = hx_nearest_on_surface(terrain, wanted, at, start, 0, nodes);
-  out[0] = hx_lane(hx_distance_from_surface(&nearest, at, normal), 0);
+  const hxNearest nearest = hx_nearest_point(terrain, wanted, at, start, 0, nodes);
+  out[0] = hx_lane(hx_smooth_distance(&nearest, at, normal), 0);
   for (int i = 0; i < 3; ++i) out[1 + i] = hx_lane(normal[i], 0);
 }
 

@@ -240,7 +240,7 @@ HX_API void hx_probe_shares(int count, const double *depth, const double *normal
   hxSharers of = {.count = count};
   memcpy(of.depth, depth, (size_t)count * sizeof *depth);
   memcpy(of.normal, normal, (size_t)count * sizeof of.normal[0]);
-  hx_shares(&of, radius, out);
+  hx_contact_shares(&of, radius, out);
 }
 
 /* The upper bound of a sphere's depth in a grid; out: one number. */
