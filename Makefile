@@ -64,7 +64,7 @@ help:
 	@echo "make bench-waiting  how long people wait for commands, a stopwatch table (2 min)"
 	@echo "make format    formats C and Python"
 	@echo "make generate  generated/ of the FMUs from their interface.toml, and the picture of the rooms"
-	@echo "make fmu       out/athena.fmu and out/phantomx_mk4.fmu"
+	@echo "make fmu       out/ROBOT.fmu of each robot of models/"
 	@echo "make lock      .ci/requirements.txt: the versions of .ci/constraints.txt with the hashes of all files"
 	@echo "make audit     known vulnerabilities of these versions; needs the network"
 	@echo "make clean     removes what these made"
@@ -264,8 +264,8 @@ generate: setup
 	$(BIN)/python tools/rooms.py
 
 fmu: setup
-	$(BIN)/hexapod export --robot athena -o out/athena.fmu
-	$(BIN)/hexapod export --robot phantomx_mk4 -o out/phantomx_mk4.fmu
+	for robot in $(basename $(notdir $(wildcard models/*.toml))); do \
+	  $(BIN)/hexapod export --robot $$robot -o out/$$robot.fmu || exit; done
 
 # the folders under the name they are imported by, for type checkers
 typing:

@@ -23,7 +23,7 @@ from benchmarks.judge import of_series
 from benchmarks.measure import Run
 from benchmarks.series import OURS, PLANT_LAW, Series, ours, peers
 from benchmarks.walks import DURATION
-from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
+from hexapod_cosim.controller.figure_style import PALETTE, SETTINGS, UNDATED, WIDTH
 
 SHOWN = (1e-9, 1.0)  # m
 NAMES = {OURS: "this plant", "mujoco": "MuJoCo", "pinocchio": "Pinocchio", "drake": "Drake"}
@@ -34,7 +34,7 @@ BEST = ("rosw3", "ros2")  # of ours, beside the peers
 
 
 def draw(runs: Sequence[Run], series: Sequence[Series], folder: Path) -> None:
-    """Writes work_precision.svg and .png.
+    """Writes work_precision.svg.
 
     The left panel shows our integrators, the right one the peers beside the best of ours.
     """
@@ -55,8 +55,7 @@ def draw(runs: Sequence[Run], series: Sequence[Series], folder: Path) -> None:
             "against the peers",
         )
         left.set_ylabel(f"largest error of the torso's path over {DURATION:g} s [m]")
-        for kind, metadata in UNDATED.items():
-            figure.savefig(folder / f"work_precision.{kind}", dpi=DPI, metadata=metadata)
+        figure.savefig(folder / "work_precision.svg", metadata=UNDATED["svg"])
 
 
 def read_runs(path: Path) -> list[Run]:

@@ -11,6 +11,7 @@ Kinematic control is the first line alone: it uses no measurement.
 
 from __future__ import annotations
 
+from numbers import Real
 from types import NoneType
 from typing import Any
 
@@ -155,6 +156,7 @@ class Controller(Stateful):
         next control begins as after reset(). Raises HexapodError for an unknown law, and then
         changes nothing.
         """
+        check_type(gains, (Gains, NoneType), "Gains, as of load_gains()", where="gains")
         check_law(law)
         self.gains, self.law = gains, law
         self.warnings = gains.warnings(self.robot, period=self.period) if gains else ()
@@ -252,8 +254,10 @@ class Controller(Stateful):
             measurement: sensor values at t; kinematic control does not use them.
 
         Raises:
-            ControllerError: t is not the time of the next step.
+            HexapodError: t is not the time of the next step, or an argument has another type.
         """
+        check_type(t, Real, "a time [s]", where="t")
+        check_type(measurement, Measurement, "a Measurement", where="measurement")
         first = self._start is None
         due = t if self._start is None else self._start + (self._count + 1) * self.period
         if not abs(t - due) <= CLOCK_TOLERANCE * self.period:

@@ -2,7 +2,7 @@
 
 Robots of one shape and density whose lengths are l times as large walk alike, with times that are
 sqrt(l) times as long (Froude's number, v^2/(g l)). The default requirements suit legs of SHORTEST
-to LONGEST, which include both robots of the package. For other legs, lengths, times, speeds and
+to LONGEST, which include the robots of the package. For other legs, lengths, times, speeds and
 rates are scaled.
 """
 

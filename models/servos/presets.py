@@ -67,9 +67,12 @@ def _measured() -> dict[str, Measured]:
     """Returns all servos, sorted by name."""
     found = {}
     for path in sorted((Path(__file__).parent / "data").glob("*.toml")):
-        for name, table in tomllib.loads(path.read_text(encoding="utf-8")).items():
-            where = f"{path}: {name}"
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        shared = tables.pop("shared", {})
+        for name, given in tables.items():
+            where, table = f"{path}: {name}", shared | given
             own = {key: table.pop(key) for key in specs(About) if key in table}
+            own["source"] = own["source"].format_map(own)
             about = About(**require(About, read_given(About, own, where), where))
             found[name] = Measured(about, read_given(Servo, table, where))
     return {name: found[name] for name in sorted(found)}
@@ -135,10 +138,9 @@ def check_constants(own: Mapping[str, Any], where: str) -> None:
     for key in ("voltage", "torque_constant", "resistance"):
         if not own.get(key, 0.0) > 0.0:
             what = "a motor without its constants"
-            got = own.get(key)
-            expected = "a number > 0"
+            got, at = own.get(key), f"{where}.{key}"
             fix = f"give {key}, or a servo of `hexapod list servos` as {MODEL}"
-            raise RobotError(what, got=got, expected=expected, fix=fix, where=f"{where}.{key}")
+            raise RobotError(what, got=got, expected="a number > 0", fix=fix, where=at)
 
 
 def refuse_others(given: Mapping[str, Any], derived: Mapping[str, Any], where: str) -> None:
@@ -156,9 +158,7 @@ def refuse_others(given: Mapping[str, Any], derived: Mapping[str, Any], where: s
 
 
 def followed(servo: Servo) -> Servo:
-    """Returns a servo of the drive motor with torque_max, speed_max and motor_constant that follow
-    from its constants.
-    """
+    """Returns a servo of the drive motor whose fields of FOLLOWING follow from its constants."""
     return replace(
         servo,
         torque_max=stall_torque(servo),

@@ -56,18 +56,16 @@ class Preset:
 @cache
 def _presets() -> dict[str, Preset]:
     """Returns all presets, sorted by name."""
-    folder = Path(__file__).parent / "data"
-    tables = {
-        name: (table, f"{path}: {name}")
-        for path in sorted(folder.glob("*.toml"))
-        for name, table in tomllib.loads(path.read_text(encoding="utf-8")).items()
-    }
-    return {name: _preset(dict(tables[name][0]), tables[name][1]) for name in sorted(tables)}
-
-
-def _preset(table: dict[str, Any], where: str) -> Preset:
-    title, source = table.pop("title"), table.pop("source")
-    return Preset(Soil(**require(Soil, read_given(Soil, table, where), where)), title, source)
+    found = {}
+    for path in sorted((Path(__file__).parent / "data").glob("*.toml")):
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        shared = tables.pop("shared", {})
+        for name, given in tables.items():
+            where, table = f"{path}: {name}", shared | given
+            title, source = table.pop("title"), table.pop("source")
+            soil = Soil(**require(Soil, read_given(Soil, table, where), where))
+            found[name] = Preset(soil, title, source)
+    return {name: found[name] for name in sorted(found)}
 
 
 def list_soils() -> list[str]:

@@ -7,6 +7,7 @@ validation; `make test` checks the sources of the pages.
 
 from __future__ import annotations
 
+import csv
 import ctypes
 import os
 import re
@@ -29,7 +30,7 @@ NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
 PAGES = [
     ROOT / name for name in ("README.md", ".github/CONTRIBUTING.md", "benchmarks/README.md")
 ] + sorted([*DOCS.rglob("*.md"), *(ROOT / "extensions").glob("*/README.md")])
-SHORT, PLAIN = "duration=2", ["--set", "outputs.plots=false"]
+SHORT = "duration=2"
 COMPUTED = os.environ.get("HEXAPOD_SITE") == "computed"
 of_the_site = pytest.mark.skipif(not COMPUTED, reason="built by make test-docs")
 
@@ -200,6 +201,7 @@ def headings(page: Path) -> set[str]:
 # what they say to type
 
 
+@pytest.mark.usefixtures("undrawn")  # README's commands draw all figures
 def test_the_tutorial_works_as_typed_from_top_to_bottom(reader: Path) -> None:
     done = 0
     for kind, text in blocks(DOCS / "tutorial.md"):
@@ -208,21 +210,20 @@ def test_the_tutorial_works_as_typed_from_top_to_bottom(reader: Path) -> None:
             done += 1
         elif not kind:
             for line in text.splitlines():
-                # the figures of one walk are enough
-                plain = PLAIN if re.match("hexapod simulate(?!.*compliant)", line) else []
-                typed(reader, *shlex.split(line.replace("--show-plot", "")), *plain)
+                typed(reader, *shlex.split(line.replace("--show-plot", "")))
                 done += 1
     assert done >= 9
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_five_minutes_of_the_page_on_controllers_work_as_typed(reader: Path) -> None:
     page = blocks(DOCS / "howto" / "my-controller.md")
     (shell,) = (text for kind, text in page if kind == "sh")
     lines = shell.splitlines()
     assert len(lines) == 3
-    more = {"compare": ["--seeds", "2"], "simulate": PLAIN}
     for line in lines:
-        typed(reader, *shlex.split(line), *more.get(line.split()[1], []))
+        more = ["--seeds", "2"] if line.startswith("hexapod compare") else []
+        typed(reader, *shlex.split(line), *more)
     assert (reader / "out" / "mine" / "report.html").is_file()
 
 
@@ -309,3 +310,65 @@ def twin_chi(tree: Path, law: str, restitution: float) -> float:
         f"print(repr(CHI[{law!r}]({restitution})))"
     )
     return float(run(tree, sys.executable, "-c", code))
+
+
+def written_table(page: Path, name: str) -> dict[str, dict[str, str]]:
+    """Cells by row and heading of a table between its markers, written by `make figures`."""
+    text = page.read_text(encoding="utf-8").split(f"control:{name} -->")[1]
+    lines = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    headings = lines[0][-len(lines[2]) + 1 :]
+    return {cells[0]: dict(zip(headings, cells[1:], strict=True)) for cells in lines[2:]}
+
+
+def changes(law: str, control: str, *rows: str) -> list[str]:
+    """Changes from kinematic control on flat ground that docs/comparison.md shows, in percent."""
+    table = written_table(DOCS / "comparison.md", f"flat {law}")
+    return [re.findall(r"\(([+-]\d+) %\)", table[row][control])[0].lstrip("+-") for row in rows]
+
+
+def test_the_readme_quotes_the_table_of_the_comparison() -> None:
+    slip, loading = "slip per metre", "loading rate at touch-down"
+    cost, roll = "electrical cost, with copper loss", "roll RMS"
+    paper = changes("tanh", "paper", slip, loading, cost)
+    own = changes("tanh", "compliant", roll, loading, slip, cost)
+    own.insert(3, changes("bristle", "compliant", slip)[0])
+    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    assert (
+        "slips {} % less than kinematic control, lands {} % more softly and costs {} %".format(
+            *paper
+        )
+        in text
+    )
+    assert (
+        "rolls {} % less, lands {} % more softly and slips {} % less "
+        "(where the ground holds a foot {} %), for {} %.".format(*own)
+    ) in text
+
+
+def test_the_page_of_compliant_control_quotes_the_table_of_the_course() -> None:
+    table = written_table(DOCS / "control.md", "compliant")
+    cost = {name: int(row["electr. %"].split()[0]) for name, row in table.items()}
+    slip = {name: -int(row["slip %"].split()[0]) for name, row in table.items()}
+    grip = ("flat", "slope", "soil", "friction", "payload", "servos", "sensors")
+    least, most = min(slip[name] for name in grip), max(slip[name] for name in grip)
+    more = [value for value in cost.values() if value > 0]
+    text = " ".join((DOCS / "control.md").read_text(encoding="utf-8").split())
+    assert f"feet slip by {least} to {most} % less" in text
+    assert (
+        f"needs {min(more)} to {max(more)} % more than kinematic control, except on rough ground "
+        f"and stairs, where it needs {-cost['rough']} and {-cost['stairs']} % less"
+    ) in text
+    assert [name for name, value in cost.items() if value < 0] == ["rough", "stairs"]
+
+
+def test_the_page_of_lost_legs_has_the_shares_that_the_benchmark_wrote() -> None:
+    with (ROOT / "benchmarks" / "results" / "loss.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["control"] == "compliant"]
+    expected: dict[str, list[str]] = {}
+    for row in rows:
+        share = "{arrives} ({path}, {peak})".format(**row)
+        expected.setdefault(row["lost"], []).append(share)
+    page = (DOCS / "control" / "loss.md").read_text(encoding="utf-8").splitlines()
+    table = [line for line in page if line.startswith("| a ") or line.startswith("| two ")]
+    assert table == [f"| {' | '.join([lost, *cells])} |" for lost, cells in expected.items()]
+    assert len(table) == 4

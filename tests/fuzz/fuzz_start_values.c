@@ -4,6 +4,7 @@
 
 #include <inttypes.h>
 
+#include "fmi/variables.h"
 #include "fmi2Functions.h"
 
 enum { MOST_LINES = 4000, MOST_LENGTH = 300, MOST_EDITS = 12 };
@@ -69,7 +70,7 @@ static void write_file(Input *in) {
   char changed[MOST_EDITS][MOST_LENGTH];
   size_t place[MOST_EDITS];
   const unsigned edits = pick(in, MOST_EDITS), end = take(in);
-  uint64_t checksum = 0;
+  uint64_t checksum = hx_table_digest;
   FILE *file = fopen(path, "wb");
   REQUIRE(file);
   for (unsigned k = 0; k < edits; k++) {

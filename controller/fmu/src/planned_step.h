@@ -15,12 +15,12 @@ typedef struct hxPlannedStep {
       rate[HX_COMMANDS]; /* vx vy yaw_rate height roll pitch, and per second */
   hxPosture posture;
   hxPlannedFeet feet;
-  hxPlane torso;              /* m, way of the torso from its nominal place (C54) */
-  hxPlane plane[HX_LEGS];     /* m, of the feet from the torso */
+  hxPlane torso;              /* m  way of the torso from its nominal place (C54) */
+  hxPlane plane[HX_LEGS];     /* m  of the feet from the torso */
   double activation[HX_LEGS]; /* 1 */
-  double lowering[HX_LEGS];   /* m, deformation of the ground */
-  double height[HX_LEGS];     /* m, of the lowered feet */
-  hxPlane shift[HX_LEGS];     /* m, of contact points, by rolling */
+  double lowering[HX_LEGS];   /* m  deformation of the ground */
+  double height[HX_LEGS];     /* m  of the lowered feet */
+  hxPlane shift[HX_LEGS];     /* m  of contact points, by rolling */
   hxPose pose[HX_LEGS];
   hxMasses masses;
 } hxPlannedStep;

@@ -17,7 +17,7 @@ typedef struct {
   hxControllerState state;
 } hxSaved;
 
-/* 1, of a period: a tick that is later than the present time by less than this is due */
+/* 1  of a period: a tick that is later than the present time by less than this is due */
 static const double clock_tolerance = 0.01;
 
 static uint64_t checksum(const hxSaved *saved) {

@@ -23,7 +23,7 @@ typedef struct hxControllerModel {
 } hxControllerModel;
 
 typedef struct hxControllerState {
-  double start; /* s, time of the first tick */
+  double start; /* s  time of the first tick */
   double time;  /* s */
   int64_t tick; /* number of the next tick */
   hxWalkPlan plan;

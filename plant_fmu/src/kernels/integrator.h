@@ -228,8 +228,8 @@ static const hxModel *end_of_step(const hxStart *start, const hxPlantMotion *y, 
 
 /* Advances the state by one accepted step of at most h_max, shortened by the error control and by
  * touch-downs; *taken is its length, *event whether contacts switched at its end. */
-static hxStatus advance(const hxStart *start, double h_max, double *next_step, hxState *state,
-                        double *taken, int *event, char *message) {
+static hxStatus advance_step(const hxStart *start, double h_max, double *next_step, hxState *state,
+                             double *taken, int *event, char *message) {
   const hxModel *model = start->model;
   hxTrial *trial = &start->scratch->trial;
   double h = model->step > 0.0
@@ -311,7 +311,7 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
     int event = 0;
     start.t = state->time;
     start.near = is_pressed(model, &state->contact, foot_rows, rows) ? model : feet;
-    const hxStatus status = advance(&start, left, next_step, state, &taken, &event, message);
+    const hxStatus status = advance_step(&start, left, next_step, state, &taken, &event, message);
     if (status != HX_OK) return status;
     if (next_step == &first) state->first_step = first, next_step = &state->next_step;
     const double t = state->time + taken;

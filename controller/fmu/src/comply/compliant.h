@@ -37,7 +37,7 @@ typedef struct hxCompliant {
   hxLoadAdaptation adaptation;
   hxSteering steering;
   int64_t count;          /* number of steps */
-  double offset[HX_LEGS]; /* m, offsets for early and late touch-downs at the last step */
+  double offset[HX_LEGS]; /* m  offsets for early and late touch-downs at the last step */
   int moving;             /* the offsets have just changed */
 } hxCompliant;
 
@@ -48,12 +48,12 @@ typedef struct hxPresentStep {
   const double *value;              /* (6) commanded vx vy yaw_rate height roll pitch */
   const hxPosture *posture;
   const hxPlane *plane; /* m  (6) planned feet, walking frame */
-  hxPlane torso;        /* m, its way in the walking frame */
-  const double *height; /* m, (6) heights of the lowered feet */
-  const double *rolled; /* m, (6) outwards from the stance to the positions that the feet aim at */
+  hxPlane torso;        /* m  its way in the walking frame */
+  const double *height; /* m  (6) heights of the lowered feet */
+  const double *rolled; /* m  (6) outwards from the stance to the positions that the feet aim at */
 } hxPresentStep;
 
-/* s, duration of the transition of the added velocity */
+/* s  duration of the transition of the added velocity */
 static const double steering_time = 0.1;
 
 /* Computes the foot forces in the walking frame (C22) [N]: f_K = R_KT R_TW f_W. */

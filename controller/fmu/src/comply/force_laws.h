@@ -16,13 +16,13 @@ typedef struct hxForceLawsModel {
   hxBurdenModel burden;
   hxTrustModel trust;
   double period; /* s */
-  /* N, of the robot; a third of it; load of all feet from which on they have settled */
+  /* N  of the robot; a third of it; load of all feet from which on they have settled */
   double weight, share, settled;
-  double most_lean; /* m, limit of the distance of the centre of mass, each axis */
-  double high;      /* m, a foot that is planned higher is in the air for certain */
-  /* 1, factors of the smoothings over a period */
+  double most_lean; /* m  limit of the distance of the centre of mass, each axis */
+  double high;      /* m  a foot that is planned higher is in the air for certain */
+  /* 1  factors of the smoothings over a period */
   double follow_load, follow_cycle, follow_weight;
-  double most; /* N m, limit of the torque */
+  double most; /* N m  limit of the torque */
 } hxForceLawsModel;
 
 typedef struct hxForceLaws {
@@ -35,35 +35,35 @@ typedef struct hxForceLaws {
   int contact[HX_LEGS];              /* the foot is on the ground */
   int carrying[HX_LEGS];             /* the gait clock need not wait for the foot any longer */
   double load[HX_LEGS];              /* 1    smoothed, in thirds of the weight */
-  double torque[HX_LEGS][HX_JOINTS]; /* N m, for the servos */
+  double torque[HX_LEGS][HX_JOINTS]; /* N m  for the servos */
   int doubted[HX_LEGS];              /* the foot's sensor is replaced */
   int misled[HX_LEGS];  /* the foot follows its path: it has just been doubted, or all are */
   int fallback;         /* kinematic control: the robot slides or is far too heavy */
-  double grip[HX_LEGS]; /* 1, factor on the planned load of a leg that is regaining contact */
+  double grip[HX_LEGS]; /* 1  factor on the planned load of a leg that is regaining contact */
   int regaining;        /* some grip may be below 1 */
   double scale;         /* 1    measured over planned weight */
-  hxPlane lean;         /* m, of the measured centre of mass from the modelled one, walking frame */
-  double squeeze_share; /* 1, of the planned squeeze, that the ground holds, smoothed */
+  hxPlane lean;         /* m  of the measured centre of mass from the modelled one, walking frame */
+  double squeeze_share; /* 1  of the planned squeeze, that the ground holds, smoothed */
   /* scale, heft and lean before a sensor contradicted the plan */
   double sure_scale, sure_heft;
   hxPlane sure_lean;
 } hxForceLaws;
 
-/* 1, of the weight: feet that carry less in all have only just met the ground */
+/* 1  of the weight: feet that carry less in all have only just met the ground */
 static const double settled_share = 0.5;
-static const double gripped = 0.99;    /* 1, of its share: a leg that is given more carries it */
-static const double load_floor = 1e-6; /* N, a smaller sum of loads cannot be divided by */
-/* 1, measured over modelled weight, range that the support accepts */
+static const double gripped = 0.99;    /* 1  of its share: a leg that is given more carries it */
+static const double load_floor = 1e-6; /* N  a smaller sum of loads cannot be divided by */
+/* 1  measured over modelled weight, range that the support accepts */
 static const double least_scale = 0.5, largest_scale = 3.0;
-/* 1, of the depth of the ground: distance of the centre of mass, each axis */
+/* 1  of the depth of the ground: distance of the centre of mass, each axis */
 static const double largest_lean = 0.4;
-/* 1, of the step height: a foot that is planned higher is in the air for certain */
+/* 1  of the step height: a foot that is planned higher is in the air for certain */
 static const double high_share = 0.25;
-/* 1, of its planned load, or a third of the weight: a doubted foot bears no more */
+/* 1  of its planned load, or a third of the weight: a doubted foot bears no more */
 static const double likely = 1.2;
-/* 1, of the heft, which changes faster: a larger scale has settled */
+/* 1  of the heft, which changes faster: a larger scale has settled */
 static const double weighed = 0.9;
-/* 1, in thirds of the weight: an awaited foot with more stands */
+/* 1  in thirds of the weight: an awaited foot with more stands */
 static const double carrying_share = 0.2;
 
 enum {

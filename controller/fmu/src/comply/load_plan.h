@@ -12,14 +12,14 @@ typedef struct hxShares {
   double activation[HX_LEGS]; /* 1  in [0, 1] */
   double normal[HX_LEGS];     /* N */
   hxPlane push[HX_LEGS];      /* N */
-  hxPlane squeeze[HX_LEGS];   /* N, the part of push by which the legs squeeze each other (C42) */
+  hxPlane squeeze[HX_LEGS];   /* N  the part of push by which the legs squeeze each other (C42) */
 } hxShares;
 
-/* 1, of the mean square arm: feet on one line share no moment about it */
+/* 1  of the mean square arm: feet on one line share no moment about it */
 static const double ridge_share = 1e-9;
-/* m2, makes the equations solvable when no foot stands */
+/* m2  makes the equations solvable when no foot stands */
 static const double least_arm = 1e-12;
-static const double least_load = 1e-6; /* N, a smaller load is not shared */
+static const double least_load = 1e-6; /* N  a smaller load is not shared */
 
 /* Returns the indentation [m] of the ground under a load [N], (f_n/K)^(2/3) (C21). */
 static inline double hx_indentation(double load, double stiffness) {
@@ -42,16 +42,16 @@ static inline void hx_shares_solve(const double S[6], const double b[3], double 
 /* Planned loads and contacts of one step. */
 typedef struct hxLoadPlan {
   double own[HX_LEGS][HX_JOINTS];   /* N m  torques for the legs' own weight and motion */
-  double carry[HX_LEGS][HX_JOINTS]; /* N m, torques for the planned load */
+  double carry[HX_LEGS][HX_JOINTS]; /* N m  torques for the planned load */
   hxShares shares;
   hxPlane feet[HX_LEGS];  /* m    contact points */
-  double weight;          /* N, sum of all shares */
+  double weight;          /* N  sum of all shares */
   int standing[HX_LEGS];  /* the leg carries its whole share */
-  double height[HX_LEGS]; /* m, of the paths above their ends */
-  double needed;          /* N m, largest element of carry */
+  double height[HX_LEGS]; /* m  of the paths above their ends */
+  double needed;          /* N m  largest element of carry */
   int swinging[HX_LEGS];
   int awaited[HX_LEGS];    /* the gait clock waits for the foot */
-  double descent[HX_LEGS]; /* m, by which the feet come down in a period, at least 0 */
+  double descent[HX_LEGS]; /* m  by which the feet come down in a period, at least 0 */
 } hxLoadPlan;
 
 /* Computes the rest of a plan whose shares and contacts are set. active: the servos carry the load;

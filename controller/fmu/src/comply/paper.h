@@ -12,54 +12,54 @@ typedef struct hxPaperModel {
   double servo_stiffness;     /* N m/rad  kp of the servos */
   double ground_stiffness;    /* N/m^1.5 */
   int pid, suspension, lifts; /* enabled parts; feet in the air are lifted */
-  double share, height_share; /* 1, of this gait */
+  double share, height_share; /* 1  of this gait */
   double yield_share;         /* 1 */
   double return_rate;         /* 1/s */
   double damping;             /* N s/m */
   double sag_limit, limit;    /* m */
-  double weighing, smoothing; /* 1, part of a new sum of loads and of a new force, per period */
-  double landed, in_air, on_ground; /* 1, factors of a decay over a period */
+  double weighing, smoothing; /* 1  part of a new sum of loads and of a new force, per period */
+  double landed, in_air, on_ground; /* 1  factors of a decay over a period */
 } hxPaperModel;
 
 typedef struct hxPaper {
-  double force[HX_LEGS][3]; /* N, smoothed, torso axes */
-  double weight;            /* N, smoothed sum of the normal forces */
-  hxPlane back;             /* m, common return of all feet */
-  double sag;               /* m, height by which the torso sags at its centre */
-  hxPlane slope;            /* 1, of the sag */
-  double lifted[HX_LEGS];   /* m, lift by the torso's sag */
-  double yielded[HX_LEGS];  /* m, deflection of the suspensions; positive: the leg is shorter */
-  double late[HX_LEGS];     /* s, time without force since the planned touch-down */
-  hxPlane shift[HX_LEGS];   /* m, correction of a foot along the ground, torso axes */
-  double lift[HX_LEGS];     /* m, correction upwards */
+  double force[HX_LEGS][3]; /* N  smoothed, torso axes */
+  double weight;            /* N  smoothed sum of the normal forces */
+  hxPlane back;             /* m  common return of all feet */
+  double sag;               /* m  height by which the torso sags at its centre */
+  hxPlane slope;            /* 1  of the sag */
+  double lifted[HX_LEGS];   /* m  lift by the torso's sag */
+  double yielded[HX_LEGS];  /* m  deflection of the suspensions; positive: the leg is shorter */
+  double late[HX_LEGS];     /* s  time without force since the planned touch-down */
+  hxPlane shift[HX_LEGS];   /* m  correction of a foot along the ground, torso axes */
+  double lift[HX_LEGS];     /* m  correction upwards */
 } hxPaper;
 
 /* Plan and measurements of a period, torso frame. */
 typedef struct hxPaperStep {
   const hxPose *pose;               /* (6) planned */
   const double (*planned)[3];       /* m (6, 3) planned centres of the feet */
-  double height[HX_LEGS];           /* m, of the planned feet above the ground */
-  double rise[HX_LEGS];             /* m/s, of the planned feet */
+  double height[HX_LEGS];           /* m  of the planned feet above the ground */
+  double rise[HX_LEGS];             /* m/s  of the planned feet */
   const int *swinging;              /* (6) planned in the air */
   const double (*angle)[HX_JOINTS]; /* rad (6, 3) measured */
-  double force[HX_LEGS][3];         /* N, measured, ground on foot */
+  double force[HX_LEGS][3];         /* N  measured, ground on foot */
 } hxPaperStep;
 
-/* 1, of the weight: what a foot carries beyond is not taken back */
+/* 1  of the weight: what a foot carries beyond is not taken back */
 static const double largest_part = 0.5;
-static const double weight_time = 0.5;   /* s, smoothing of the sum of all loads */
-static const double contact_part = 0.02; /* 1, of the weight: a foot with more stands */
-/* 1, of the weight: with less in all, the force of some foot is not reported */
+static const double weight_time = 0.5;   /* s  smoothing of the sum of all loads */
+static const double contact_part = 0.02; /* 1  of the weight: a foot with more stands */
+/* 1  of the weight: with less in all, the force of some foot is not reported */
 static const double whole_part = 0.9;
-/* 1, added to the spread of the standing feet, for the tilt of the torso */
+/* 1  added to the spread of the standing feet, for the tilt of the torso */
 static const double evening = 0.15;
-/* s, in which a landed foot gives back the lift that it had in the air */
+/* s  in which a landed foot gives back the lift that it had in the air */
 static const double landed_time = 0.05;
-/* m, a foot that is planned higher above the ground meets it early */
+/* m  a foot that is planned higher above the ground meets it early */
 static const double early_height = 0.003;
-static const double late_time = 0.04;    /* s, after the planned touch-down: a foot may be late */
-static const double search_speed = 0.08; /* m/s, at most, of a foot that extends */
-static const double air_time = 0.06; /* s, in which the suspension of a foot in the air returns */
+static const double late_time = 0.04;    /* s  after the planned touch-down: a foot may be late */
+static const double search_speed = 0.08; /* m/s  at most, of a foot that extends */
+static const double air_time = 0.06; /* s  in which the suspension of a foot in the air returns */
 
 static inline void hx_paper_compile(const hxControllerDefinition *definition, hxPaperModel *model) {
   const double h = definition->period, duty = definition->gait.duty;

@@ -6,20 +6,20 @@
 #include "load_plan.h"
 
 typedef struct hxPlannedSqueeze {
-  double friction; /* 1, coefficient that is believed */
-  double torque;   /* N m, of a tripod's load at the arm of the torso's height */
+  double friction; /* 1  coefficient that is believed */
+  double torque;   /* N m  of a tripod's load at the arm of the torso's height */
 } hxPlannedSqueeze;
 
-/* 1, share of its friction that a foot is planned to use at most */
+/* 1  share of its friction that a foot is planned to use at most */
 static const double most_friction = 0.7;
-/* N, floor of a change of a force that a factor is divided by */
+/* N  floor of a change of a force that a factor is divided by */
 static const double least_push = 1e-12;
 
 /* weight: of the robot [N]; depth: of the ground below the torso's origin in the stance [m]. */
 static inline void hx_planned_squeeze_compile(const hxControllerDefinition *definition,
                                               double weight, double depth,
                                               hxPlannedSqueeze *model) {
-  const double tripod_share = 1.0 / 3.0; /* 1, of the weight: the load of the comparison */
+  const double tripod_share = 1.0 / 3.0; /* 1  of the weight: the load of the comparison */
   model->friction = definition->friction;
   model->torque = depth * tripod_share * weight;
 }

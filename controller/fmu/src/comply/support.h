@@ -11,12 +11,12 @@ typedef struct hxSupport {
   int active;            /* the part is on: feet are lowered, and servos carry the load */
   double duty, handover; /* cycles; hand-overs of a leg never overlap, whatever the gait */
   double stiffness;      /* N/m^1.5 */
-  double rest_weight;    /* N, that the robot requires in its stance */
+  double rest_weight;    /* N  that the robot requires in its stance */
   hxPlane rest_moment;   /* N m */
-  double rest_depth;     /* m, penetration of a foot in the stance */
+  double rest_depth;     /* m  penetration of a foot in the stance */
 } hxSupport;
 
-/* m2, of the feet about their centre: feet that are closer take no moment about the vertical */
+/* m2  of the feet about their centre: feet that are closer take no moment about the vertical */
 static const double least_spread = 1e-4;
 
 /* Returns a transition from 0 to 1 over [0, 1] with continuous rate and acceleration. */

@@ -13,7 +13,7 @@ typedef struct hxSway {
   hxPlane rest;          /* kg m    sum of m p of all links in the stance */
 } hxSway;
 
-/* m, by which all feet are moved to find the mass that moves with them */
+/* m  by which all feet are moved to find the mass that moves with them */
 static const double reach = 1e-3;
 
 /* Returns the sum of m p of all links with all feet moved from the stance [kg m]. */

@@ -7,27 +7,27 @@
 #include "hexapod/controller.h"
 
 typedef struct hxBurdenModel {
-  double most;         /* N m, largest torque that a servo may be commanded */
-  double fade, follow; /* 1, factors of the smoothings over a period */
+  double most;         /* N m  largest torque that a servo may be commanded */
+  double fade, follow; /* 1  factors of the smoothings over a period */
 } hxBurdenModel;
 
 typedef struct hxBurden {
   double heft; /* 1    measured over modelled weight */
-  /* N m, largest torque of a joint that carries the model's weight, over the last gait cycle or so
+  /* N m  largest torque of a joint that carries the model's weight, over the last gait cycle or so
    */
   double peak;
-  /* 1, factor of the support, below 1 so that no servo exceeds its torque limit */
+  /* 1  factor of the support, below 1 so that no servo exceeds its torque limit */
   double strength;
   int overburdened; /* the robot is far too heavy: kinematic control */
 } hxBurden;
 
-/* 1, of the time in which the support follows the weight, for the measured weight */
+/* 1  of the time in which the support follows the weight, for the measured weight */
 static const double quick = 0.2;
-/* 1, part of the needed torque that servos may give */
+/* 1  part of the needed torque that servos may give */
 static const double no_support = 0.54, full_support = 0.84;
-/* 1, of the allowed torque, needed to carry the measured weight */
+/* 1  of the allowed torque, needed to carry the measured weight */
 static const double support_helps = 1.35, support_fails = 1.5;
-/* 1, measured over modelled weight; values outside are not taken as weights */
+/* 1  measured over modelled weight; values outside are not taken as weights */
 static const double lightest = 0.5, heaviest = 4.0;
 
 static inline void hx_burden_compile(const hxControllerDefinition *definition,

@@ -6,7 +6,7 @@
 #include "hexapod/controller.h"
 #include <math.h>
 
-/* 1, of the weight: a foot with more touches down, a foot with less lifts off */
+/* 1  of the weight: a foot with more touches down, a foot with less lifts off */
 static const double contact_share = 0.02, lift_share = 0.005;
 /* Detects touch-down and lift-off with hysteresis (C23) from normal forces [N]; weight: of the
  * robot [N]. */

@@ -8,31 +8,31 @@
 typedef struct hxHealthModel {
   double stiffness; /* N m/rad  of the servos */
   double drag;      /* N m s/rad  that the speed takes from their torque */
-  double rotor;     /* kg m2, inertia at the joint */
-  double most;      /* N m, largest torque */
-  double way;       /* rad, by which a firmware leads its servo in a period at most */
+  double rotor;     /* kg m2  inertia at the joint */
+  double most;      /* N m  largest torque */
+  double way;       /* rad  by which a firmware leads its servo in a period at most */
   double period;    /* s */
 } hxHealthModel;
 
 typedef struct hxHealth {
-  double strange[HX_LEGS][HX_JOINTS]; /* s, of unexplained torque, with its sign */
-  double still[HX_LEGS][HX_JOINTS];   /* s, for which the joint has not moved */
-  double proof[HX_LEGS][HX_JOINTS];   /* s, for which the servo has seemed to work */
-  double goal[HX_LEGS][HX_JOINTS];    /* rad, to which the firmware has led its servo */
-  double angle[HX_LEGS][HX_JOINTS];   /* rad, measured at the last step */
-  double speed[HX_LEGS][HX_JOINTS];   /* rad/s, in the period before it */
+  double strange[HX_LEGS][HX_JOINTS]; /* s  of unexplained torque, with its sign */
+  double still[HX_LEGS][HX_JOINTS];   /* s  for which the joint has not moved */
+  double proof[HX_LEGS][HX_JOINTS];   /* s  for which the servo has seemed to work */
+  double goal[HX_LEGS][HX_JOINTS];    /* rad  to which the firmware has led its servo */
+  double angle[HX_LEGS][HX_JOINTS];   /* rad  measured at the last step */
+  double speed[HX_LEGS][HX_JOINTS];   /* rad/s  in the period before it */
   int begun;                          /* there was one */
   int faulty[HX_LEGS][HX_JOINTS];     /* the servo does not work */
   int locked[HX_LEGS][HX_JOINTS];     /* its joint did not move when this was found */
 } hxHealth;
 
-static const double strange_share = 0.5;  /* 1, of the largest torque, that nothing explains */
-static const double strange_time = 0.035; /* s, in one direction: the servo does not work */
-/* s, largest damping over stiffness, besides the drag of the model */
+static const double strange_share = 0.5;  /* 1  of the largest torque, that nothing explains */
+static const double strange_time = 0.035; /* s  in one direction: the servo does not work */
+/* s  largest damping over stiffness, besides the drag of the model */
 static const double damping_time = 0.02;
-static const double still_speed = 0.05; /* rad/s, of a joint that does not move */
-static const double sound_share = 0.35; /* 1, of the largest torque: the servo seems to work */
-/* s, for which a servo must seem to work: longer than a period of the trial */
+static const double still_speed = 0.05; /* rad/s  of a joint that does not move */
+static const double sound_share = 0.35; /* 1  of the largest torque: the servo seems to work */
+/* s  for which a servo must seem to work: longer than a period of the trial */
 static const double proof_time = 1.2;
 
 static inline void hx_health_compile(const hxControllerDefinition *definition,

@@ -8,33 +8,33 @@
 #include <string.h>
 
 typedef struct hxLoadAdaptationModel {
-  double rating;  /* N2 m2, square of the continuous torque of a servo */
-  double squeeze; /* 1, weight on ground on which feet creep, while all servos are cool */
+  double rating;  /* N2 m2  square of the continuous torque of a servo */
+  double squeeze; /* 1  weight on ground on which feet creep, while all servos are cool */
   int narrows;    /* the gait has a narrow stance */
-  double follow_work, follow; /* 1, factors of the smoothings over a period */
+  double follow_work, follow; /* 1  factors of the smoothings over a period */
 } hxLoadAdaptationModel;
 
 typedef struct hxLoadAdaptation {
-  double work[HX_LEGS][HX_JOINTS]; /* N2 m2, squares of the torques, smoothed over a gait cycle */
-  double heat[HX_LEGS][HX_JOINTS]; /* N2 m2, the same, smoothed over a minute */
-  double heft;      /* 1, measured over modelled weight, smoothed over a gait cycle */
-  double narrowing; /* 1, part of the way to the narrow stance */
-  double squeeze;   /* 1, weight of the torques in the planned squeeze */
+  double work[HX_LEGS][HX_JOINTS]; /* N2 m2  squares of the torques, smoothed over a gait cycle */
+  double heat[HX_LEGS][HX_JOINTS]; /* N2 m2  the same, smoothed over a minute */
+  double heft;      /* 1  measured over modelled weight, smoothed over a gait cycle */
+  double narrowing; /* 1  part of the way to the narrow stance */
+  double squeeze;   /* 1  weight of the torques in the planned squeeze */
 } hxLoadAdaptation;
 
-static const double heat_time = 60.0; /* s, in which a small servo warms up */
-/* 1, mean square torque over that of the rating */
+static const double heat_time = 60.0; /* s  in which a small servo warms up */
+/* 1  mean square torque over that of the rating */
 static const double cool = 0.8, hot = 1.0;
-/* 1, torque needed for the measured weight over torque allowed */
+/* 1  torque needed for the measured weight over torque allowed */
 static const double easy = 0.8, hard = 1.0;
-/* 1, mean square torque of a gait cycle over that of the rating */
+/* 1  mean square torque of a gait cycle over that of the rating */
 static const double over = 1.0, far_over = 1.2;
-/* 1, share of the planned squeeze that is held */
+/* 1  share of the planned squeeze that is held */
 static const double creeps = 0.75, holds = 0.82;
-/* 1, weight of the torques when it costs nothing or servos need it */
+/* 1  weight of the torques when it costs nothing or servos need it */
 static const double most_squeeze = 0.95;
-static const double modelled = 1.1, heavy = 1.2; /* 1, measured over modelled weight */
-/* 1, of the set weight of the squeeze, in the narrow stance */
+static const double modelled = 1.1, heavy = 1.2; /* 1  measured over modelled weight */
+/* 1  of the set weight of the squeeze, in the narrow stance */
 static const double spared = 0.75;
 
 /* squeeze: weight on ground on which feet creep, while all servos are cool, 0 for none [1];

@@ -8,22 +8,22 @@
 #include <math.h>
 
 typedef struct hxTouchdown {
-  double offset[HX_LEGS]; /* m, by which the paths are raised */
-  double late[HX_LEGS];   /* s, for how long the ground has been missing */
-  double waited[HX_LEGS]; /* s, for how long the gait clock has waited for the foot */
+  double offset[HX_LEGS]; /* m  by which the paths are raised */
+  double late[HX_LEGS];   /* s  for how long the ground has been missing */
+  double waited[HX_LEGS]; /* s  for how long the gait clock has waited for the foot */
 } hxTouchdown;
 
-/* m, a foot that meets the ground earlier on its way down has met it early */
+/* m  a foot that meets the ground earlier on its way down has met it early */
 static const double hx_early = 0.002;
-static const double hx_reach_limit = 0.040; /* m, by which a foot is lowered at most */
+static const double hx_reach_limit = 0.040; /* m  by which a foot is lowered at most */
 static const double reach_speed = 0.08;     /* m/s  downwards */
-static const double hold_limit = 0.030;     /* m, upwards: the largest step height of the robots */
-/* s, delay after the planned touch-down that is tolerated */
+static const double hold_limit = 0.030;     /* m  upwards: the largest step height of the robots */
+/* s  delay after the planned touch-down that is tolerated */
 static const double grace = 0.040;
-/* s, of the gait clock, in which a foot that it waits for begins to move down */
+/* s  of the gait clock, in which a foot that it waits for begins to move down */
 static const double patience = 0.025;
-static const double return_time = 0.060; /* s, in which an offset decays in the swing */
-static const double negligible = 1e-5;   /* m, a smaller offset is set to 0 */
+static const double return_time = 0.060; /* s  in which an offset decays in the swing */
+static const double negligible = 1e-5;   /* m  a smaller offset is set to 0 */
 
 /* Returns whether some foot has an offset or misses the ground. */
 static inline int hx_touchdown_busy(const hxTouchdown *touchdown) {
@@ -71,10 +71,10 @@ static inline void hx_touchdown_step(double period, const int contact[HX_LEGS],
 }
 
 typedef struct hxLandings {
-  /* m, height of each foot's path above its end at the last landing; infinite before the first one
+  /* m  height of each foot's path above its end at the last landing; infinite before the first one
    */
   double met[HX_LEGS];
-  double before[HX_LEGS]; /* m, the same at the landing before; 0 until then */
+  double before[HX_LEGS]; /* m  the same at the landing before; 0 until then */
   int flew[HX_LEGS];      /* the foot has left the ground in a swing since */
 } hxLandings;
 

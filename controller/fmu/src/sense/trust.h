@@ -7,12 +7,12 @@
 
 typedef struct hxTrustModel {
   double period;      /* s */
-  double follow_load; /* 1, factor of the smoothing over a period */
+  double follow_load; /* 1  factor of the smoothing over a period */
   int64_t calm;       /* steps without sliding until feet are trusted again */
 } hxTrustModel;
 
 typedef struct hxTrust {
-  double level;             /* 1, factor on all torques */
+  double level;             /* 1  factor on all torques */
   int64_t slide_periods;    /* steps for which the robot has been sliding */
   int64_t recovery_periods; /* steps that remain until feedback resumes after sliding */
 } hxTrust;
@@ -21,29 +21,29 @@ typedef struct hxTrust {
 typedef struct hxSensorWatchModel {
   double period;  /* s */
   double weight;  /* N */
-  double missing; /* N, when all feet measure less, some sensor reports too little */
-  double memory;  /* s, time without contradiction until a sensor is trusted again */
+  double missing; /* N  when all feet measure less, some sensor reports too little */
+  double memory;  /* s  time without contradiction until a sensor is trusted again */
 } hxSensorWatchModel;
 
 typedef struct hxSensorWatch {
-  double contradicted[HX_LEGS]; /* s, duration of the contradiction */
-  double left[HX_LEGS];         /* s, time until the sensor is trusted again */
+  double contradicted[HX_LEGS]; /* s  duration of the contradiction */
+  double left[HX_LEGS];         /* s  time until the sensor is trusted again */
 } hxSensorWatch;
 
-/* 1, common tangential over normal force beyond the plan, which only a sliding robot reaches */
+/* 1  common tangential over normal force beyond the plan, which only a sliding robot reaches */
 static const double sliding_drag = 0.55;
-/* 1, gait cycles without sliding until feet are trusted again */
+/* 1  gait cycles without sliding until feet are trusted again */
 static const double calm_cycles = 0.5;
-static const double sliding_time = 0.04; /* s, longer than a foot skids at touch-down */
-static const double trusted = 0.99;      /* 1, so near to its goal the trust is at it */
-/* s, longest plausible contradiction, which exceeds the delay of the sensors */
+static const double sliding_time = 0.04; /* s  longer than a foot skids at touch-down */
+static const double trusted = 0.99;      /* 1  so near to its goal the trust is at it */
+/* s  longest plausible contradiction, which exceeds the delay of the sensors */
 static const double contradiction_time = 0.10;
 static const double missing_share = 0.92; /* 1  of the weight */
 static const double memory_cycles = 1.5;  /* 1  gait cycles */
-/* 1, of the weight: as contact_share and lift_share, for a doubted foot; more, because torso and
+/* 1  of the weight: as contact_share and lift_share, for a doubted foot; more, because torso and
  * feet accelerate */
 static const double found_part = 0.10, gone_part = 0.03;
-/* N, of a doubted foot, so that the shares of feet in the air are not 0 / 0 */
+/* N  of a doubted foot, so that the shares of feet in the air are not 0 / 0 */
 static const double least_share = 1e-6;
 
 static inline void hx_trust_compile(const hxControllerDefinition *definition, hxTrustModel *model) {

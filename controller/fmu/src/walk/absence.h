@@ -7,35 +7,35 @@
 #include "kinematics.h"
 
 typedef struct hxAbsenceModel {
-  double period, handover; /* s, handover: of a load */
-  hxPlane home[HX_LEGS];   /* m, feet of the stance */
+  double period, handover; /* s  handover: of a load */
+  hxPlane home[HX_LEGS];   /* m  feet of the stance */
 } hxAbsenceModel;
 
 typedef struct hxAbsence {
   int legs[HX_LEGS];                  /* out of service */
   int gone[HX_LEGS];                  /* that were out of service before */
-  double command[HX_LEGS][HX_JOINTS]; /* rad, of these legs */
-  double place[HX_LEGS][HX_JOINTS];   /* rad, around which their faulty joints are tried */
+  double command[HX_LEGS][HX_JOINTS]; /* rad  of these legs */
+  double place[HX_LEGS][HX_JOINTS];   /* rad  around which their faulty joints are tried */
   /* periods since the legs out of service changed, and since the begin of the trial */
   int64_t since, trial;
-  hxPlane begin, goal; /* m, ways of the torso from its nominal place, walking frame */
+  hxPlane begin, goal; /* m  ways of the torso from its nominal place, walking frame */
 } hxAbsence;
 
 enum { HX_MOST_ABSENT = 2 }; /* legs: four must walk */
-/* 1, swing time and step height without a leg over those of the gait */
+/* 1  swing time and step height without a leg over those of the gait */
 static const double swift = 0.6, low_step = 0.6;
-static const double shift_time = 0.4; /* s, in which the torso moves over the other feet */
-/* s, in which the walk then takes the torso back to its path */
+static const double shift_time = 0.4; /* s  in which the torso moves over the other feet */
+/* s  in which the walk then takes the torso back to its path */
 static const double back_time = 3.0;
-static const double far_shift = 0.045; /* m, at most */
+static const double far_shift = 0.045; /* m  at most */
 static const double fold_speed = 4.0;  /* rad/s */
-static const double lead = 0.15;       /* rad, of a command before its joint, at most */
-/* rad, from its place, at which a faulty joint has another one */
+static const double lead = 0.15;       /* rad  of a command before its joint, at most */
+/* rad  from its place, at which a faulty joint has another one */
 static const double limp_way = 0.25;
-static const double fold_margin = 0.1;  /* rad, of a folded joint from its limit */
-static const double trial_swing = 0.08; /* rad, size of the swing of a faulty joint */
-static const double trial_time = 1.0;   /* s, its period */
-static const double arrived = 1e-3;     /* rad, a command this near to the plan is the plan */
+static const double fold_margin = 0.1;  /* rad  of a folded joint from its limit */
+static const double trial_swing = 0.08; /* rad  size of the swing of a faulty joint */
+static const double trial_time = 1.0;   /* s  its period */
+static const double arrived = 1e-3;     /* rad  a command this near to the plan is the plan */
 
 /* Changes a gait to the wave of the legs that are not absent, if any is absent. */
 HX_SELDOM static void hx_gait_without(hxGait *gait, const int absent[HX_LEGS], int backwards) {

@@ -18,7 +18,7 @@ typedef struct hxFade {
   double angle[HX_LEGS][HX_JOINTS], speed[HX_LEGS][HX_JOINTS], torque[HX_LEGS][HX_JOINTS];
 } hxFade;
 
-static const double fade_time = 0.4; /* s, duration of a transition */
+static const double fade_time = 0.4; /* s  duration of a transition */
 
 static inline void hx_fade_compile(double period, hxFadeModel *model) {
   const double steps = fmax(nearbyint(fade_time / period), 1.0);

@@ -12,7 +12,7 @@ typedef struct hxFootPathsModel {
   hxGaitClockModel clock;
   double period, step_height, touchdown_speed;
   double swing_time;           /* s */
-  double landing_lead;         /* s, from lift-off to the middle of the next stance */
+  double landing_lead;         /* s  from lift-off to the middle of the next stance */
   hxPlane home[HX_LEGS];       /* m   feet of the stance */
   hxPlane inward[HX_LEGS];     /* m   from the stance to the narrow one */
   double turned[HX_LEGS];      /* m   that the feet roll outwards on this way */
@@ -28,11 +28,11 @@ typedef struct hxPlannedFeet {
   double rise[HX_LEGS];      /* m/s  of z */
   double phase[HX_LEGS];     /* 1    in [0, 1) */
   double blend[HX_LEGS];     /* 1    s of swinging feet, else 0 */
-  /* m, where a swinging foot will touch down, or where a standing foot stands */
+  /* m  where a swinging foot will touch down, or where a standing foot stands */
   hxPlane goal[HX_LEGS];
-  hxPlane pull[HX_LEGS];  /* m, (goal - foot)/(1 - s) of swinging feet, 0 of standing feet */
-  double rolled[HX_LEGS]; /* m, outwards from the stance to the position that the foot aims at */
-  hxPlane way;            /* m, displacement of the walking frame over the ground */
+  hxPlane pull[HX_LEGS];  /* m  (goal - foot)/(1 - s) of swinging feet, 0 of standing feet */
+  double rolled[HX_LEGS]; /* m  outwards from the stance to the position that the foot aims at */
+  hxPlane way;            /* m  displacement of the walking frame over the ground */
   double turn;            /* rad  of the walking frame over the ground */
   hxTwist twist;          /* of the body */
 } hxPlannedFeet;
@@ -41,16 +41,16 @@ typedef struct hxPlannedFeet {
 typedef struct hxFootPaths {
   hxGaitClock clock;
   int met[HX_LEGS]; /* the foot has met the ground on its way down, and stays where it is */
-  double narrowing; /* 1, part of the way to the narrow stance that the steps aim at */
+  double narrowing; /* 1  part of the way to the narrow stance that the steps aim at */
 } hxFootPaths;
 
-/* 1, part of the swing after which the landing point stays fixed on the ground */
+/* 1  part of the swing after which the landing point stays fixed on the ground */
 static const double freeze = 0.75;
-static const double same_distance = 1e-6; /* m, distances that differ by less are equal */
-/* m, a foot this close to its stance position makes no step */
+static const double same_distance = 1e-6; /* m  distances that differ by less are equal */
+/* m  a foot this close to its stance position makes no step */
 static const double home_tolerance = 1e-9;
 static const double nearly_done = 1e-12; /* 1   floor of 1 - s */
-/* 1/s, m/s, downwards, of feet that end their swings at once */
+/* 1/s, m/s  downwards, of feet that end their swings at once */
 static const double drop_rate = 10.0, landing_speed = 0.08;
 
 static inline void hx_foot_paths_compile(const hxControllerDefinition *definition,
@@ -141,7 +141,7 @@ static inline void place_foot(const hxFootPathsModel *model, const hxFootPaths *
   const hxPlane was = hx_times(back, hx_plane_sub(carried, feet->way)), v = feet->twist.velocity;
   feet->plane[leg] = hx_times(back, hx_plane_sub(ground_of(feet, leg), feet->way));
   /* a foot on the ground: dp/dt = -(v + i w p) */
-  /* 1/s, at which the foot passes through its path */
+  /* 1/s  at which the foot passes through its path */
   const double pace = paths->clock.waiting ? 0.0 : 1.0 / model->swing_time;
   const hxPlane pulled = hx_scaled(hx_times(back, feet->pull[leg]), slope * pace);
   feet->velocity[leg] = hx_plane(pulled.x - (v.x - w * was.y), pulled.y - (v.y + w * was.x));

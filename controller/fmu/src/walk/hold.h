@@ -8,21 +8,21 @@
 
 typedef struct hxHoldModel {
   int64_t every; /* steps between two updates */
-  double time;   /* s, between two updates */
+  double time;   /* s  between two updates */
   int posture, path;
-  double attitude_step, height_step; /* 1, factors of the integrals for one update */
-  double smooth;                     /* 1, factor of the ground's inclination for one update */
+  double attitude_step, height_step; /* 1  factors of the integrals for one update */
+  double smooth;                     /* 1  factor of the ground's inclination for one update */
   double angle_limit, height_limit, path_rate, speed_limit, turn_limit;
 } hxHoldModel;
 
 /* Measurements for one update. Feet are in the walking frame. */
 typedef struct hxHoldInput {
-  hxPlane plane[HX_LEGS];         /* m, contact points from the measured joint angles */
-  double height[HX_LEGS];         /* m, of the feet's centres */
-  hxPlane planned[HX_LEGS];       /* m, planned positions */
+  hxPlane plane[HX_LEGS];         /* m  contact points from the measured joint angles */
+  double height[HX_LEGS];         /* m  of the feet's centres */
+  hxPlane planned[HX_LEGS];       /* m  planned positions */
   double planned_height[HX_LEGS]; /* m */
   double load[HX_LEGS];           /* 1    thirds of the weight */
-  double tilt[2];                 /* rad, roll and pitch minus the commanded ones */
+  double tilt[2];                 /* rad  roll and pitch minus the commanded ones */
   double yaw;                     /* rad */
   hxPlane velocity;               /* m/s  commanded, walking frame */
   double yaw_rate;                /* rad/s */
@@ -32,19 +32,19 @@ typedef struct hxHold {
   double lift[HX_LEGS]; /* m      of the feet */
   hxPlane velocity;     /* m/s    added to the commanded one */
   double yaw_rate;      /* rad/s  added to the commanded one */
-  hxPlane way;          /* m, lost displacement */
-  double heading;       /* rad, lost heading */
+  hxPlane way;          /* m  lost displacement */
+  double heading;       /* rad  lost heading */
   int ground_known, looked;
   double ground[2];          /* rad    inclination */
-  double angle[2], height;   /* rad, m of the corrections */
-  hxPlane foot[HX_LEGS];     /* m, at the last update, turned by the yaw */
-  double load[HX_LEGS], yaw; /* 1, rad, at the last update */
+  double angle[2], height;   /* rad, m  of the corrections */
+  hxPlane foot[HX_LEGS];     /* m  at the last update, turned by the yaw */
+  double load[HX_LEGS], yaw; /* 1, rad  at the last update */
 } hxHold;
 
-static const double update_time = 0.04; /* s, interval of the loops, at least a period */
-/* 1, in thirds of the weight: a foot with a larger load does not slip */
+static const double update_time = 0.04; /* s  interval of the loops, at least a period */
+/* 1  in thirds of the weight: a foot with a larger load does not slip */
 static const double loaded_from = 0.4;
-static const double determinant_floor = 1e-6;       /* m4, feet on one line define no plane */
+static const double determinant_floor = 1e-6;       /* m4  feet on one line define no plane */
 static const double whole_turn = 6.283185307179586; /* rad */
 
 /* Fits the plane height = c + s_x x + s_y y of least weighted squares (C37): fit = c, s_x, s_y.

@@ -11,9 +11,9 @@ typedef struct hxInverseDynamics {
   double period, gravity; /* s, m/s2 */
   double rotor, friction; /* kg m2, N m  of servo and gear */
   double drag;            /* N m s/rad  that a joint's speed takes from its servo */
-  double floor;           /* m, height of the ground below the stance, torso frame */
+  double floor;           /* m  height of the ground below the stance, torso frame */
   double torso_mass, torso_inertia;
-  double total_mass; /* kg, of torso and links */
+  double total_mass; /* kg  of torso and links */
   hxPlane torso_com;
   double torso_com_z;
   double mass[HX_LEGS][HX_JOINTS];
@@ -29,7 +29,7 @@ typedef struct hxMasses {
   hxPlane point[HX_LEGS][HX_JOINTS];  /* m   U, from where the coxa axis meets the hip */
   hxPlane place[HX_LEGS][HX_JOINTS];  /* m   walking frame */
   double height[HX_LEGS][HX_JOINTS];  /* m */
-  hxPlane ground[HX_LEGS][HX_JOINTS]; /* m, relative to the ground, from the start of the walk */
+  hxPlane ground[HX_LEGS][HX_JOINTS]; /* m  relative to the ground, from the start of the walk */
   hxPlane torso_place, torso_ground;  /* m */
   double torso_height;                /* m */
   hxPlane turn;                       /* 1   e^(i yaw) of the walking frame */
@@ -42,9 +42,9 @@ typedef struct hxDemand {
   double lever[HX_LEGS][HX_JOINTS]
               [3]; /* m    J^T: joint torques per force on the contact point, walking frame */
   hxPlane push;    /* N    horizontal force the ground must give the robot, walking frame */
-  double weight;   /* N, vertical force of the ground */
-  hxPlane moment;  /* N m, sum of p f_n over the feet */
-  double twist;    /* N m, sum of Im(p^* f_h), the moment about the vertical */
+  double weight;   /* N  vertical force of the ground */
+  hxPlane moment;  /* N m  sum of p f_n over the feet */
+  double twist;    /* N m  sum of Im(p^* f_h), the moment about the vertical */
 } hxDemand;
 
 /* Three successive steps. Without one of the neighbours the present step has no acceleration. */
@@ -53,7 +53,7 @@ typedef struct hxNeighbours {
   const hxPose *pose[3];     /* of all legs */
 } hxNeighbours;
 
-/* rad/s, speed at which the gear's dry friction saturates, as in the plant */
+/* rad/s  speed at which the gear's dry friction saturates, as in the plant */
 static const double gear_speed = 0.05;
 
 static inline void hx_inverse_dynamics_compile(const hxControllerDefinition *definition,

@@ -40,13 +40,13 @@ typedef struct hxSoftness {
   double splay; /* outward under an upward force */
 } hxSoftness;
 
-/* rad or 1, tolerance for round-off at the edge of the reach */
+/* rad or 1  tolerance for round-off at the edge of the reach */
 static const double flag_tolerance = 1e-9;
-/* 1, floor of sin(gamma), because a straight leg has no finite joint speed */
+/* 1  floor of sin(gamma), because a straight leg has no finite joint speed */
 static const double singular_sine = 0.02;
-/* 1, least cos(gamma), because a folded leg of equal links has no direction */
+/* 1  least cos(gamma), because a folded leg of equal links has no direction */
 static const double folded_cosine = -1.0 + 1e-12;
-static const double radius_floor = 1e-9; /* m2, floor of the squared distance from the coxa axis */
+static const double radius_floor = 1e-9; /* m2  floor of the squared distance from the coxa axis */
 
 static inline void hx_leg_solver_compile(const hxControllerDefinition *definition, int leg,
                                          hxLegSolver *model) {

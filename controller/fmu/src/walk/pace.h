@@ -11,8 +11,8 @@ enum { HX_STANCE_SAMPLES = 5, HX_SAMPLES = HX_STANCE_SAMPLES + 16 };
 
 /* A moment of the cycle of a leg. */
 typedef struct hxMoment {
-  double time; /* s, since the middle of the stance */
-  double part; /* 1, of the way to the next stance */
+  double time; /* s  since the middle of the stance */
+  double part; /* 1  of the way to the next stance */
   double rate; /* 1/s */
   double lift; /* m */
   double rise; /* m/s */
@@ -28,7 +28,7 @@ typedef struct hxPace {
   int outrun[HX_LEGS];       /* joints that cannot follow it, so that the body walks slower */
 } hxPace;
 
-/* 1, joint speed that a command may need, over the largest one or over that of steps on the spot:
+/* 1  joint speed that a command may need, over the largest one or over that of steps on the spot:
  * servos follow so short a peak (the PhantomX's own walk has 1.056), and feet land late from 1.2 on
  */
 static const double fastest = 1.06;

@@ -11,9 +11,9 @@ typedef struct hxTwist {
   double yaw_rate;  /* rad/s */
 } hxTwist;
 
-/* 1, share of the swing at each end in which the foot moves vertically only */
+/* 1  share of the swing at each end in which the foot moves vertically only */
 static const double dwell = 0.1;
-static const double small_angle = 1e-12; /* rad, below it sin(a)/a is 1 */
+static const double small_angle = 1e-12; /* rad  below it sin(a)/a is 1 */
 
 /* Computes the horizontal progress s in [0, 1] at the part tau of a swing, and ds/dtau (C6). */
 static inline void blend(double tau, double *s, double *slope) {

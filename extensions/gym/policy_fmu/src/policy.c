@@ -29,7 +29,7 @@ typedef struct {
   hxPolicyState state;
 } hxSavedPolicy;
 
-/* 1, of a period: a tick that is later than the present time by less than this is due */
+/* 1  of a period: a tick that is later than the present time by less than this is due */
 static const double clock_tolerance = 0.01;
 static const double two_pi = 6.283185307179586;
 
