@@ -11,6 +11,7 @@ Kinematic control is the first line alone: it uses no measurement.
 
 from __future__ import annotations
 
+from numbers import Real
 from types import NoneType
 from typing import Any
 
@@ -49,7 +50,7 @@ class Controller(Stateful):
 
     STATE = (
         "plan", "compliant", "paper", "fade", "health", "_start", "_count", "_shown", "_next",
-        "_back",
+        "_returning_leg",
     )  # fmt: skip
 
     def __init__(
@@ -73,7 +74,7 @@ class Controller(Stateful):
         self._asked = gait  # that was asked for; without a leg, another one is walked
         self._build(gait)
         self._next: Gait | None = None  # that the legs change to
-        self._back: int | None = None  # leg that is taken back into service then
+        self._returning_leg: int | None = None  # leg that is taken back into service then
         self.warnings = gains.warnings(robot, period=period) if gains else ()
         self._out = JointCommand()
         self.diagnostics = Diagnostics()
@@ -106,14 +107,15 @@ class Controller(Stateful):
             self.compliant.present = laws.present
         if self.paper is not None and paper is not None:
             self.paper.restore(paper.save())
-        self.plan.adopt(plan, self._back)
-        self._next = self._back = None
+        self.plan.adopt(plan, self._returning_leg)
+        self._next = self._returning_leg = None
 
-    def _change(self, back: int | None = None) -> None:
+    def _change(self, returning_leg: int | None = None) -> None:
         """Begins a change to the gait of the legs in service, with one that comes back (C58)."""
-        absent = self.plan.absence.legs & (np.arange(LEGS) != back)
+        absent = self.plan.absence.legs & (np.arange(LEGS) != returning_leg)
         backwards = self.plan.ramp.target.vx < 0.0
-        self._next, self._back = gait_without(self._asked, absent, backwards=backwards), back
+        self._next = gait_without(self._asked, absent, backwards=backwards)
+        self._returning_leg = returning_leg
         self.plan.end()
 
     def change_gait(self, gait: Gait) -> None:
@@ -144,7 +146,7 @@ class Controller(Stateful):
             return
         there = absence.fold(measurement.angle, health.faulty, health.locked, self._out)
         self.diagnostics.unreachable[...] &= ~absence.legs
-        if there.any() and self._back is None:
+        if there.any() and self._returning_leg is None:
             self._change(int(np.argmax(there)))
 
     def change_control(self, gains: Gains | None, law: str = "compliant") -> None:
@@ -155,6 +157,7 @@ class Controller(Stateful):
         next control begins as after reset(). Raises HexapodError for an unknown law, and then
         changes nothing.
         """
+        check_type(gains, (Gains, NoneType), "Gains, as of load_gains()", where="gains")
         check_law(law)
         self.gains, self.law = gains, law
         self.warnings = gains.warnings(self.robot, period=self.period) if gains else ()
@@ -215,7 +218,7 @@ class Controller(Stateful):
 
     def reset(self) -> None:
         """Puts the robot in its stance and clears all memory; the next step is the first."""
-        self._back = None
+        self._returning_leg = None
         if self.gait != self._asked:
             self._build(self._asked)
         for part in (self.compliant, self.paper, self.fade, self.health, self.plan):
@@ -252,8 +255,10 @@ class Controller(Stateful):
             measurement: sensor values at t; kinematic control does not use them.
 
         Raises:
-            ControllerError: t is not the time of the next step.
+            HexapodError: t is not the time of the next step, or an argument has another type.
         """
+        check_type(t, Real, "a time [s]", where="t")
+        check_type(measurement, Measurement, "a Measurement", where="measurement")
         first = self._start is None
         due = t if self._start is None else self._start + (self._count + 1) * self.period
         if not abs(t - due) <= CLOCK_TOLERANCE * self.period:

@@ -11,7 +11,7 @@ from typing import Any
 
 from hexapod_cosim.controller.gains import SECTIONS, Gains, GainsError
 from hexapod_cosim.models import RobotError
-from hexapod_cosim.models.errors import refuse_path
+from hexapod_cosim.models.errors import check_type, refuse_path
 from hexapod_cosim.models.files import decoding_toml, parse_toml, read_text
 from hexapod_cosim.models.schema import read_given, read_record, require, specs
 
@@ -32,8 +32,10 @@ def raising_gains_errors() -> Iterator[None]:
 def save_gains(gains: Gains, path: str | Path) -> Path:
     """Writes a gains file (TOML, floats to the last bit).
 
-    Raises GainsError when the file cannot be written.
+    Raises GainsError for other gains and when the file cannot be written.
     """
+    check_type(gains, Gains, "gains, as of load_gains()", where="gains", error=GainsError)
+    refuse_path(path, "the gains file", GainsError)
     lines = ["# Gains of compliant and paper control, SI units; made by `hexapod design`."]
     lines += [f"format = {FORMAT}", *_toml_lines(gains)]
     for part in SECTIONS:
@@ -71,7 +73,7 @@ def load_gains(path: str | Path) -> Gains:
     except OSError as error:
         what, fix = "cannot read the gains file", "make one with `hexapod design`"
         raise GainsError(what, got=error.strerror, fix=fix, where=str(path)) from error
-    found, expected = table.pop("format", None), f"format = {FORMAT}"
+    found, expected = table.pop("format", "no format"), f"format = {FORMAT}"
     if found != FORMAT:
         what, fix = "unknown format of gains", "make the file again with `hexapod design`"
         raise GainsError(what, got=found, expected=expected, fix=fix, where=str(path))

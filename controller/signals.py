@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane
+from hexapod_cosim.models.arrays import array_of
 
 DEFAULT_PERIOD = 0.005  # s    between two steps of the controller, and of a co-simulation
 
@@ -34,6 +35,12 @@ class Measurement:
     quaternion: Array = field(default_factory=_upright)  # 1    (4,) torso to world, w x y z
     # rad/s    (3,) torso, world axes
     angular_velocity: Array = field(default_factory=lambda: np.zeros(3))
+
+    def __post_init__(self) -> None:
+        """Raises HexapodError for an array of another shape."""
+        shapes = {"contact": (LEGS,), "quaternion": (4,), "angular_velocity": (3,)}
+        for name, value in vars(self).items():
+            array_of(value, shapes.get(name, (LEGS, 3)), where=name)
 
 
 @dataclass

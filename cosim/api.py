@@ -112,7 +112,7 @@ def _scenario(
     if text is not None:
         table = table_with_control(table, parse_control(text, where="controller").text)
     changed = with_values(table, settings, "settings")
-    return scenario_from_table(changed, where=where, given=list(settings))
+    return scenario_from_table(changed, where=where, given=settings, option="settings: ")
 
 
 def report(results: Result | Sequence[Result], folder: str | Path) -> Path:

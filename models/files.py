@@ -13,7 +13,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.models.errors import HexapodError
+from hexapod_cosim.models.errors import HexapodError, unknown_name
 
 LARGEST_FILE = 64 * 2**20  # bytes  of robots, scenarios, studies, gains, URDFs and JSON files
 DEEPEST = 64  # the most tables and arrays inside each other in a TOML file
@@ -81,6 +81,21 @@ def decoding_toml(path: Path, *, kind: str, error: type[HexapodError]) -> Iterat
             fix=fix if other is None else f"give the path of a {kind} file",
             where=str(path),
         ) from cause
+
+
+def path_of(
+    path_or_name: str | Path, kind: str, bundled: Mapping[str, Path], error: type[HexapodError]
+) -> Path:
+    """Returns the path of a file that is given by its path or by its name in `bundled`.
+
+    Such a name precedes a folder. Raises the class `error` for another name; kind: of the file.
+    """
+    path, name = Path(path_or_name), str(path_or_name)
+    if path.suffix or len(path.parts) != 1 or path.is_file():
+        return path
+    if name not in bundled and not path.is_dir():
+        raise unknown_name(kind, name, bundled, error=error)
+    return bundled.get(name, path)
 
 
 @contextmanager

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.models.arrays import Array
+from hexapod_cosim.models.arrays import Array, array_of
+from hexapod_cosim.models.errors import check_type
 from hexapod_cosim.models.records import Leg, Robot, Torso
 
 LEGS, JOINTS = 6, 3
@@ -168,7 +169,9 @@ def foot_position(leg: Leg, angle: Array) -> Array:
 
 def foot_positions(robot: Robot, angle: Array) -> Array:
     """Returns the feet's centres (6, 3) in the torso frame [m] at joint angles (6, 3) [rad]."""
-    return np.array([foot_position(leg, q) for leg, q in zip(robot.legs, angle, strict=True)])
+    check_type(robot, Robot, "a Robot, as of load_robot()", where="robot")
+    angles = array_of(angle, (LEGS, JOINTS), where="angle")
+    return np.array([foot_position(leg, q) for leg, q in zip(robot.legs, angles, strict=True)])
 
 
 def body_states(

@@ -22,8 +22,8 @@ from typing import Any
 
 from hexapod_cosim.models.arrays import Vector3, Vector6
 from hexapod_cosim.models.contact.law import BodyContact, Contact
-from hexapod_cosim.models.errors import RobotError, refuse_path, unknown_name
-from hexapod_cosim.models.files import parse_toml, read_text, reading_toml
+from hexapod_cosim.models.errors import RobotError, refuse_path
+from hexapod_cosim.models.files import parse_toml, path_of, read_text, reading_toml
 from hexapod_cosim.models.friction import Friction
 from hexapod_cosim.models.ground.surface import Terrain
 from hexapod_cosim.models.ground.table import read_terrain, terrain_beside
@@ -104,13 +104,8 @@ def _robot_from_urdf(table: Mapping[str, Any], where: str) -> Robot:
 
 def robot_path(path_or_name: str | Path) -> Path:
     """Returns the path of a robot file, given by path or by name."""
-    path = Path(path_or_name)
-    if path.suffix or len(path.parts) != 1 or path.is_file():
-        return path
-    own = Path(__file__).parent / f"{path_or_name}.toml"
-    if not own.is_file():
-        raise unknown_name("robot", str(path_or_name), list_robots(), error=RobotError)
-    return own
+    own = {path.stem: path for path in sorted(Path(__file__).parent.glob("*.toml"))}
+    return path_of(path_or_name, "robot", own, RobotError)
 
 
 def robot_from_table(table: Mapping[str, Any], *, where: str) -> Robot:

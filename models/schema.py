@@ -15,6 +15,7 @@ from numbers import Integral, Real
 from typing import Any, cast, get_type_hints
 
 from hexapod_cosim.models.errors import RobotError, unknown_name
+from hexapod_cosim.models.files import LARGEST
 
 # SI unit of a key -> units that may be written for it, each with its size in the SI unit
 SCALES: dict[str, dict[str, float]] = {
@@ -166,18 +167,19 @@ class Flag:
 
 @dataclass(frozen=True)
 class Whole:
-    """An integer of at least 0."""
+    """An integer of at least 0 that TOML can hold."""
 
-    expected = "a whole number >= 0"
+    expected = "a whole number from 0 to 2^63 - 1"
 
     def read(self, value: Any, where: str) -> int:
         """Returns the value. Raises RobotError; `where` names the key."""
         if isinstance(value, bool) or not isinstance(value, Integral):  # NumPy's as well
             raise wrong_type(value, self.expected, "write 1 or another whole number", where)
-        if value < 0:
-            what, fix = "out of range", "write 0 or a larger whole number"
+        number = int(value)
+        if not 0 <= number <= LARGEST:
+            what, fix = "out of range", "write 1 or another whole number"
             raise RobotError(what, got=value, expected=self.expected, fix=fix, where=where)
-        return int(value)
+        return number
 
 
 Spec = Number | Vector | Choice | Text | Texts | Flag | Whole

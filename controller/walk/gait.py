@@ -74,30 +74,16 @@ class Gait:
         ):
             check_type(value, Real, "a number", where=name)
             if not low < value < high:
-                raise HexapodError(
-                    "impossible gait",
-                    got=value,
-                    expected=f"{low} < {name} < {high}",
-                    fix=f"change {name}",
-                    where=self.name,
-                )
+                raise self._impossible(value, f"{low} < {name} < {high}")
         if not 0.0 <= self.narrowing < np.inf:
-            raise HexapodError(
-                "impossible gait",
-                got=self.narrowing,
-                expected="0 <= narrowing < inf",
-                fix="change narrowing",
-                where=self.name,
-            )
+            raise self._impossible(self.narrowing, "0 <= narrowing < inf")
         if self.touchdown_speed < 0.0 or len(self.offsets) != len(AROUND_TO_LEGS):
             got = (self.touchdown_speed, len(self.offsets))
-            raise HexapodError(
-                "impossible gait",
-                got=got,
-                expected="a touchdown_speed >= 0 and 6 offsets",
-                fix="correct it",
-                where=self.name,
-            )
+            raise self._impossible(got, "a touchdown_speed >= 0 and 6 offsets")
+
+    def _impossible(self, got: object, expected: str) -> HexapodError:
+        fix = "change this field"
+        return HexapodError("impossible gait", got=got, expected=expected, fix=fix, where=self.name)
 
     def phase(self, clock: float) -> NDArray[np.float64]:
         """Returns the phases of the legs (6,) in [0, 1) at a gait clock in cycles."""

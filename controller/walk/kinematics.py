@@ -24,6 +24,7 @@ from hexapod_cosim.controller.plane import (
     square,
 )
 from hexapod_cosim.models import LEG_NAMES, ReachError, Robot, RobotError
+from hexapod_cosim.models.errors import check_type
 
 AXES = ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (0.0, 1.0, 0.0))
 AXIS_TOLERANCE = 1e-9  # 1    on the components of an axis
@@ -74,10 +75,11 @@ class Softness(NamedTuple):
 class LegSolver:
     """Forward and inverse kinematics of a robot's legs.
 
-    Raises RobotError when the joint axes have another pattern.
+    Raises RobotError for another type and for joint axes of another pattern.
     """
 
     def __init__(self, robot: Robot) -> None:
+        check_type(robot, Robot, "a Robot, as of load_robot()", where="robot", error=RobotError)
         _check_axes(robot)
         legs = robot.legs
         tip = np.array([[(k.length, k.offset_y, k.offset_z) for k in leg.links] for leg in legs])

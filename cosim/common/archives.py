@@ -19,6 +19,7 @@ TOTAL_SIZE = 512 * 2**20  # bytes, unpacked, of all files
 NAME_SIZE = 255  # bytes, of a folder's or file's name
 PATH_SIZE = 1000  # bytes, of a path inside the archive
 FIX = "take another copy of the file, and none from a place that you do not trust"
+NEEDED = "a ZIP file with a modelDescription.xml"
 MAKE = "make one with `hexapod export -o FILE.fmu`"
 
 
@@ -27,13 +28,7 @@ def open_archive(path: Path) -> zipfile.ZipFile:
     try:
         archive = zipfile.ZipFile(path)
     except Exception as error:  # zipfile raises errors of many types for damaged files
-        raise FmuError(
-            "not an FMU",
-            got=str(error) or type(error).__name__,
-            expected="a ZIP file with a modelDescription.xml",
-            fix=MAKE,
-            where=str(path),
-        ) from error
+        raise _unreadable(path, "not an FMU", error, NEEDED, MAKE) from error
     problem = next(unsafe_members(archive.infolist()), None)
     if problem is None:
         return archive
@@ -50,13 +45,8 @@ def unpack(path: Path, folder: Path) -> None:
             try:
                 _unpack_member(archive, member, target)
             except Exception as error:  # damaged data; a full disk
-                raise FmuError(
-                    "a file of the archive cannot be unpacked",
-                    got=str(error) or type(error).__name__,
-                    expected="intact data, and room for it",
-                    fix=FIX,
-                    where=f"{path}: {member.filename}",
-                ) from error
+                what, expected = "a file of the archive cannot be unpacked", "intact data and room"
+                raise _unreadable(f"{path}: {member.filename}", what, error, expected) from error
 
 
 def read_member(archive: zipfile.ZipFile, name: str) -> bytes:
@@ -64,13 +54,16 @@ def read_member(archive: zipfile.ZipFile, name: str) -> bytes:
     try:
         return archive.read(name)
     except Exception as error:
-        raise FmuError(
-            "a file of the archive is damaged",
-            got=str(error) or type(error).__name__,
-            expected="intact data",
-            fix=FIX,
-            where=f"{archive.filename}: {name}",
-        ) from error
+        what = "a file of the archive is damaged"
+        raise _unreadable(f"{archive.filename}: {name}", what, error, "intact data") from error
+
+
+def _unreadable(
+    where: str | Path, what: str, error: Exception, expected: str, fix: str = FIX
+) -> FmuError:
+    """Returns the error for what zipfile cannot read; its own errors may have no text."""
+    got = str(error) or type(error).__name__
+    return FmuError(what, got=got, expected=expected, fix=fix, where=str(where))
 
 
 def _unpack_member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, target: Path) -> None:

@@ -10,10 +10,9 @@ from zipfile import ZipFile
 
 from fmpy import read_model_description
 
-from hexapod_cosim.cosim.common.archives import open_archive, read_member
+from hexapod_cosim.cosim.common.archives import MAKE, NEEDED, open_archive, read_member
 from hexapod_cosim.models.errors import FmuError, refuse_path
 
-FIX = "make one with `hexapod export -o FILE.fmu`"
 DESCRIPTION = "modelDescription.xml"
 IDENTIFIER = r"[A-Za-z_]\w{0,199}"
 
@@ -32,13 +31,9 @@ def refuse_other_kinds(description: Any, path: Path, versions: Collection[str]) 
     """Raises FmuError for a description of another version, or without co-simulation."""
     if description.fmiVersion not in versions or description.coSimulation is None:
         kind = "co-simulation" if description.coSimulation else "model exchange only"
-        raise FmuError(
-            "wrong kind of FMU",
-            got=f"FMI {description.fmiVersion}, {kind}",
-            expected=f"FMI {' or '.join(versions)} for co-simulation",
-            fix=FIX,
-            where=str(path),
-        )
+        got = f"FMI {description.fmiVersion}, {kind}"
+        expected = f"FMI {' or '.join(versions)} for co-simulation"
+        raise _refusal("wrong kind of FMU", got, expected, path)
 
 
 def open_description(path: Path) -> Any:
@@ -51,13 +46,12 @@ def open_description(path: Path) -> Any:
         description = read_model_description(path, validate=False)
     except Exception as error:
         of_python = isinstance(error, TypeError | AttributeError | ValueError | LookupError)
-        raise FmuError(
-            "the FMU's modelDescription.xml cannot be read",
-            got="missing or wrong attributes" if of_python else str(error),
-            expected="XML after the standard's schema",
-            fix=FIX,
-            where=str(path),
-        ) from error
+        what, expected = (
+            f"the FMU's {DESCRIPTION} cannot be read",
+            "XML after the standard's schema",
+        )
+        got = "missing or wrong attributes" if of_python else str(error)
+        raise _refusal(what, got, expected, path) from error
     _refuse_identifiers(description, path)
     return description
 
@@ -69,18 +63,12 @@ def refuse_unsafe(path: Path) -> None:
     """
     refuse_path(path, "an FMU", FmuError)
     if not path.is_file():
-        raise FmuError("no such FMU", got=str(path), expected="an existing .fmu file", fix=FIX)
+        raise FmuError("no such FMU", got=str(path), expected="an existing .fmu file", fix=MAKE)
     try:
         with open_archive(path) as archive:
             _refuse_markup(archive, path)
     except KeyError as error:
-        raise FmuError(
-            "not an FMU",
-            got=error.args[0],
-            expected="a ZIP file with a modelDescription.xml",
-            fix=FIX,
-            where=str(path),
-        ) from error
+        raise _refusal("not an FMU", error.args[0], NEEDED, path) from error
 
 
 def _refuse_markup(archive: ZipFile, path: Path) -> None:
@@ -89,13 +77,7 @@ def _refuse_markup(archive: ZipFile, path: Path) -> None:
     found = forbidden_markup(read_member(archive, DESCRIPTION))
     if found:
         expected = "XML in UTF-8 without a document type, which might define entities"
-        raise FmuError(
-            "modelDescription.xml is not read",
-            got=found,
-            expected=expected,
-            fix=FIX,
-            where=str(path),
-        )
+        raise _refusal(f"{DESCRIPTION} is not read", found, expected, path)
 
 
 def forbidden_markup(data: bytes) -> str | None:
@@ -111,10 +93,9 @@ def _refuse_identifiers(description: Any, path: Path) -> None:
         name = "hexapod" if kind is None else kind.modelIdentifier
         if not re.fullmatch(IDENTIFIER, str(name), re.ASCII):
             expected = "a C identifier of at most 200 characters, such as hexapod"
-            raise FmuError(
-                "modelIdentifier is no file's name",
-                got=name,
-                expected=expected,
-                fix=FIX,
-                where=str(path),
-            )
+            raise _refusal("modelIdentifier is no file's name", name, expected, path)
+
+
+def _refusal(what: str, got: object, expected: str, path: Path) -> FmuError:
+    """Returns the error for a file that is no FMU of the kind that is needed."""
+    return FmuError(what, got=got, expected=expected, fix=MAKE, where=str(path))

@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from hexapod_cosim.models.errors import unknown_name
+
 AXIS = re.compile(r"\{(\w+)\}|\[i\]")
 AXES = re.compile(r"\{\w+\}\.|[._]\{\w+\}|\{\w+\}|\[i\]")
 ROOTS = ("gait.", "gains.", "parts.")  # objects besides the robot that parameters are named after
@@ -38,6 +40,8 @@ def with_defaults(
     defaults: dict[str, Any] = {"size": 3} if "[i]" in name else {}
     if "type" not in entry:
         unit = entry.get("unit", "1")
+        if unit not in units:
+            raise unknown_name("unit", unit, units, where=f"interface.toml: {name}")
         usual = units[unit].get("nominal", 1.0) if isinstance(units[unit], dict) else 1.0
         defaults |= {"unit": unit, "nominal": usual}
     if causality == "parameter":

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
+from hexapod_cosim.cosim.common.files import why_unreadable
 from hexapod_cosim.cosim.master.loop import COMPLETED, Outcome
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -104,7 +105,7 @@ def facts_from_table(table: Mapping[str, Any], *, where: str) -> RunFacts:
     except (KeyError, TypeError) as error:
         raise HexapodError(
             "damaged or foreign results",
-            got=f"{type(error).__name__}: {error}",
+            got=why_unreadable(error, "description of a run"),
             expected="all facts of a run",
             fix="run the scenario again",
             where=where,

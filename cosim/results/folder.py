@@ -17,6 +17,7 @@ from hexapod_cosim.cosim.common.files import (
     claim_folder,
     clear_folder,
     read_json,
+    why_unreadable,
     write_json,
     write_text,
 )
@@ -205,7 +206,7 @@ def damage_reported(folder: Path) -> Iterator[None]:
             where=str(error.filename or folder),
         ) from error
     except Exception as error:  # facts of wrong types fail anywhere in a report
-        got = f"{type(error).__name__}: {error}"
+        got = why_unreadable(error, "result of a run")
         raise _damaged(folder, got, "results as `hexapod` wrote them") from error
 
 
@@ -225,7 +226,8 @@ def read_scenario(folder: Path) -> str:
     try:
         return read_text(folder / SCENARIO)
     except (OSError, UnicodeDecodeError) as error:
-        raise _damaged(folder / SCENARIO, str(error), "the scenario that was run") from error
+        got = why_unreadable(error, "text")
+        raise _damaged(folder / SCENARIO, got, "the scenario that was run") from error
 
 
 def _damaged(path: Path, got: str, expected: str) -> HexapodError:

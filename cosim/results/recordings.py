@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -249,18 +248,11 @@ def _recording(names: Sequence[str], rows: np.ndarray, path: Path) -> Recording:
 
 
 def _not_a_recording(path: Path, error: Exception, expected: str) -> HexapodError:
-    fix = "record it again, by `hexapod simulate` or from the robot"
+    what, got = "not a recording", " ".join(str(error).split()) or "an empty file"
     if isinstance(error, FileNotFoundError | IsADirectoryError | PermissionError):
-        got = os.strerror(error.errno) if error.errno else type(error).__name__
-        return HexapodError(
-            "no recording",
-            got=got,
-            expected=f"a file {path.name} of a run",
-            fix=fix,
-            where=str(path),
-        )
-    message = " ".join(str(error).split()) or "an empty file"
-    return HexapodError("not a recording", got=message, expected=expected, fix=fix, where=str(path))
+        what, got, expected = "no recording", str(error.strerror), f"a file {path.name} of a run"
+    fix = "record it again, by `hexapod simulate` or from the robot"
+    return HexapodError(what, got=got, expected=expected, fix=fix, where=str(path))
 
 
 READERS: Mapping[str, Callable[[Path], Recording]] = {  # the faster one first

@@ -17,7 +17,14 @@ from typing import Any
 
 import tomlkit
 
-from hexapod_cosim.cosim.common.files import PARTS, RUN_FILE, atomic_text, write_json, write_text
+from hexapod_cosim.cosim.common.files import (
+    PARTS,
+    RUN_FILE,
+    atomic_text,
+    why_unreadable,
+    write_json,
+    write_text,
+)
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs, judged_pairs
 from hexapod_cosim.cosim.results.folder import METRICS_FILE, SCENARIO
@@ -200,10 +207,9 @@ def read_seeds(path: Path) -> dict[str, list[Summary]]:
             for row in csv.DictReader(file):
                 runs.setdefault(row["control"], []).append(_summary(row))
     except (OSError, KeyError, TypeError, ValueError, csv.Error) as error:
-        missing = error.strerror if isinstance(error, OSError) else ""
         raise HexapodError(
-            "no runs by seed" if missing else "damaged file",
-            got=missing or f"{type(error).__name__}: {error}",
+            "no runs by seed" if isinstance(error, OSError) else "damaged file",
+            got=why_unreadable(error, "table of runs"),
             expected=f"{SEEDS} of a comparison, with a line per run and all metrics",
             fix="run `hexapod compare` again",
             where=str(path),

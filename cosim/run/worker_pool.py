@@ -9,6 +9,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import shutil
+import sys
 import tempfile
 import threading
 from collections.abc import Callable
@@ -70,6 +71,7 @@ class WorkerPool(Executor):
         initialise: Callable[[], None] | None = None,
         scratch: Path | None = None,
     ) -> None:
+        _refuse_unguarded_script()
         self._context = multiprocessing.get_context(START_METHOD)
         self._stop = self._context.Event()
         self._setup = self._stop, scratch, initialise
@@ -115,6 +117,21 @@ class WorkerPool(Executor):
             self._own.process = process
             self._processes.append(process)
         return process
+
+
+def _refuse_unguarded_script() -> None:
+    """Raises HexapodError for a script that every worker process would run again from its start."""
+    main = sys.modules["__main__"]
+    path = Path(getattr(main, "__file__", None) or "")
+    is_script = main.__spec__ is None and path.is_file()
+    if not is_script or "__name__" in path.read_text(encoding="utf-8", errors="replace"):
+        return
+    raise HexapodError(
+        "worker processes would run the script again",
+        got=str(path),
+        expected='calls below `if __name__ == "__main__":`',
+        fix="write this line above them and indent them, or ask for one worker",
+    )
 
 
 def raise_if_stopped(_done: float) -> None:

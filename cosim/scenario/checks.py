@@ -33,38 +33,28 @@ def check_steps(scenario: Scenario) -> None:
     Raises ScenarioError.
     """
     h, where = scenario.macro_step, f"{scenario.where}: duration"
-    ratio = scenario.duration / h
-    if ratio > MAX_STEPS * (1.0 + WHOLE_STEPS_TOLERANCE):
+    if scenario.duration / h > MAX_STEPS * (1.0 + WHOLE_STEPS_TOLERANCE):
         expected = f"at most {MAX_STEPS} macro-steps, {MAX_STEPS * h:g} s with macro_step = {h:g} s"
         fix = "shorten the duration or lengthen macro_step"
         raise ScenarioError(
             "too many macro-steps", got=scenario.duration, expected=expected, fix=fix, where=where
         )
-    steps = scenario.steps
-    if steps < 1 or abs(ratio - steps) > WHOLE_STEPS_TOLERANCE * steps:
-        expected = f"a multiple of macro_step = {h:g} s"
-        fix = f"{max(steps, 1) * h:g} is the nearest"
-        raise ScenarioError(
-            "not a whole number of macro-steps",
-            got=scenario.duration,
-            expected=expected,
-            fix=fix,
-            where=where,
-        )
+    _check_multiple(scenario.duration, max(scenario.steps, 1), h, where)
 
 
 def check_interval(scenario: Scenario) -> None:
     """Checks that `outputs.interval` is a whole number of macro-steps. Raises ScenarioError."""
-    h, interval = scenario.macro_step, scenario.outputs.interval
-    every = scenario.every
-    if interval and abs(interval / h - every) > WHOLE_STEPS_TOLERANCE * every:
-        raise ScenarioError(
-            "not a whole number of macro-steps",
-            got=interval,
-            expected=f"a multiple of macro_step = {h:g} s",
-            fix=f"{every * h:g} is the nearest; 0 keeps every macro-step",
-            where=f"{scenario.where}: outputs.interval",
-        )
+    interval, where = scenario.outputs.interval, f"{scenario.where}: outputs.interval"
+    if interval:
+        _check_multiple(interval, scenario.every, scenario.macro_step, where)
+
+
+def _check_multiple(time: float, steps: int, h: float, where: str) -> None:
+    """Raises ScenarioError for a time [s] that is not so many macro-steps h [s] long."""
+    if abs(time / h - steps) > WHOLE_STEPS_TOLERANCE * steps:
+        expected, fix = f"a multiple of macro_step = {h:g} s", f"{steps * h:g} is the nearest"
+        what = "not a whole number of macro-steps"
+        raise ScenarioError(what, got=time, expected=expected, fix=fix, where=where)
 
 
 def check_servo_faults(scenario: Scenario, robot: Robot) -> None:
@@ -86,7 +76,7 @@ def check_servo_faults(scenario: Scenario, robot: Robot) -> None:
 def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
     """Checks that the names in `parameters` are parameters of the robot's FMU.
 
-    `given` are the names set with --set, for the messages. Raises ScenarioError.
+    `given` are the names of settings, as which messages name them. Raises ScenarioError.
     """
     if not scenario.parameters and not scenario.events_of(Tuning):
         return
@@ -101,7 +91,7 @@ def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
     for name, value in scenario.parameters.items():
         if name in known:
             continue
-        where = f"--set {name}" if name in given else f"{scenario.where}: parameters"
+        where = f"{scenario.where}: {name if name in given else 'parameters'}"
         if name in others:
             raise _not_a_parameter(name, others[name], where)
         if name in given:

@@ -67,23 +67,33 @@ def load_scenario(path_or_name: str | Path, *, overrides: Sequence[str] = ()) ->
     """
     given = read_overrides(overrides)
     table, where = read_tables(path_or_name)
-    try:
-        return scenario_from_table(with_values(table, given), where=where, given=given)
-    except ScenarioError as error:
-        key = (error.where or "").removeprefix(f"{where}: ")
-        for name in (key, f"{key}.{error.got}"):  # of a value, of an unknown key
-            if name in given:
-                error.where = f"--set {name}"
-        raise
+    return scenario_from_table(with_values(table, given), where=where, given=given)
 
 
 def scenario_from_table(
-    table: Mapping[str, Any], *, where: str, given: Collection[str] = ()
+    table: Mapping[str, Any], *, where: str, given: Collection[str] = (), option: str = "--set "
 ) -> Scenario:
-    """Returns the checked scenario in the tables of a file.
+    """Returns the checked scenario in the tables of a file. Raises ScenarioError.
 
-    `where` names the file in messages; `given` are the names set with --set. Raises ScenarioError.
+    Messages name the file `where`, but `option` before one of the names `given`, which it set.
     """
+    try:
+        scenario = _read(table, where)
+        check_steps(scenario)
+        check_interval(scenario)
+        check_parameters(scenario, given=given)
+    except ScenarioError as error:
+        key = (error.where or "").removeprefix(f"{where}: ")
+        if f"{key}.{error.got}" in given:  # an unknown key
+            key = f"{key}.{error.got}"
+        if {key, key.partition("[")[0]} & set(given):  # also of an entry in a list
+            error.where = f"{option}{key}"
+        raise
+    return scenario
+
+
+def _read(table: Mapping[str, Any], where: str) -> Scenario:
+    """Reads all keys. Raises ScenarioError."""
     with errors_of(where):
         refuse_unknown_keys(table, list(KEYS), "")
         plain = {key: value for key, value in table.items() if key in PLAIN_KEYS}
@@ -110,11 +120,7 @@ def scenario_from_table(
             where=where,
             **plain,
         )
-    scenario = _with_gravity_of_parameters(scenario)
-    check_steps(scenario)
-    check_interval(scenario)
-    check_parameters(scenario, given=given)
-    return scenario
+    return _with_gravity_of_parameters(scenario)
 
 
 def _with_gravity_of_parameters(scenario: Scenario) -> Scenario:

@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.scenario.controls import LAW, control_beside
 from hexapod_cosim.cosim.scenario.records import KEYS, SECTIONS, SETTINGS
 from hexapod_cosim.models import ScenarioError, unknown_name
 from hexapod_cosim.models.errors import check_type, refuse_path
-from hexapod_cosim.models.files import parse_toml, read_text, reading_toml
+from hexapod_cosim.models.files import parse_toml, path_of, read_text, reading_toml
 from hexapod_cosim.models.ground.table import terrain_beside
 from hexapod_cosim.models.schema import specs
 
@@ -30,7 +30,7 @@ def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
     The second value is the file's name for messages. Raises ScenarioError.
     """
     refuse_path(path_or_name, "the scenario", ScenarioError)
-    path = _scenario_path(path_or_name)
+    path = path_of(path_or_name, "scenario", list_scenarios(), ScenarioError)
     if path.suffix == ".fmu":
         raise ScenarioError(
             "an FMU is no scenario",
@@ -55,15 +55,6 @@ def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
     return table, path.name if path in list_scenarios().values() else str(path)
 
 
-def _scenario_path(path_or_name: str | Path) -> Path:
-    path, bundled = Path(path_or_name), list_scenarios()
-    if path.suffix or len(path.parts) != 1 or path.is_file():
-        return path
-    if str(path_or_name) not in bundled:
-        raise unknown_name("scenario", str(path_or_name), bundled, error=ScenarioError)
-    return bundled[str(path_or_name)]
-
-
 def read_overrides(overrides: Iterable[str], where: str = "--set") -> dict[str, Any]:
     """Returns the values of texts "NAME=VALUE" by name. Raises ScenarioError.
 
@@ -79,14 +70,6 @@ def read_overrides(overrides: Iterable[str], where: str = "--set") -> dict[str, 
             )
         values[name] = parse_value(value)
     return values
-
-
-def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
-    """Returns a copy of the tables with each "NAME=VALUE" set. Raises ScenarioError.
-
-    NAME is a key of the scenario or else an FMU parameter.
-    """
-    return with_values(table, read_overrides(overrides))
 
 
 def with_values(

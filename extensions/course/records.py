@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.results.metric_table import METRICS, PER_RADIAN
 from hexapod_cosim.cosim.scenario.controls import Control
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.tables import with_overrides, with_values
+from hexapod_cosim.cosim.scenario.tables import read_overrides, with_values
 from hexapod_cosim.models import HexapodError, unknown_name
 from hexapod_cosim.models.files import merged_tables
 from hexapod_cosim.models.ground.table import CATALOGUE
@@ -189,7 +189,7 @@ def _cases_of(
     for entry in table["case"]:
         where = f"{kind}.toml: {entry['name']}, {split}"
         content = with_values(base, {**entry.get("set", {}), **entry[split]})
-        content = with_overrides(content, settings)
+        content = with_values(content, read_overrides(settings))
         content["title"] = f"{entry['name']}: {entry['about']}"
         yield Case(
             name=entry["name"],

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.common.files import atomic_text, read_json, write_json
+from hexapod_cosim.cosim.common.files import atomic_text, read_json, why_unreadable, write_json
 from hexapod_cosim.cosim.common.plant_files import package_version
 from hexapod_cosim.extensions.course.records import QUANTITIES, Case, CourseError, load_course
 from hexapod_cosim.extensions.course.runs import Run
@@ -119,7 +119,7 @@ def read_table(folder: Path) -> tuple[Table, dict[str, Any]]:
     except (KeyError, TypeError, ValueError, OSError) as error:
         raise CourseError(
             "damaged result",
-            got=f"{type(error).__name__}: {error}",
+            got=why_unreadable(error, "result of a benchmark"),
             expected=f"{RESULT} and {RUNS} of a benchmark",
             fix="run `hexapod benchmark` again",
             where=str(folder),

@@ -20,6 +20,8 @@ from hexapod_cosim.extensions.gym.settings import (
     changed,
 )
 from hexapod_cosim.extensions.gym.settings import task as task_settings
+from hexapod_cosim.models.arrays import array_of
+from hexapod_cosim.models.errors import HexapodError
 
 LARGEST_SEED = 2**32  # seeds are drawn below it
 
@@ -110,13 +112,6 @@ class HexapodEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 def checked(action: Any, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """Returns an action as an array. Raises InvalidAction for another shape or for no numbers."""
     try:
-        array = np.asarray(action, dtype=np.float32)
-    except (TypeError, ValueError) as error:
-        raise gymnasium.error.InvalidAction(
-            f"action: got {action!r}, expected an array of numbers of shape {shape}"
-        ) from error
-    if array.shape != shape:
-        raise gymnasium.error.InvalidAction(
-            f"action: got shape {array.shape}, expected {shape}, one number for each joint"
-        )
-    return array
+        return array_of(action, shape, where="action").astype(np.float32)
+    except HexapodError as error:
+        raise gymnasium.error.InvalidAction(str(error)) from error

@@ -35,9 +35,9 @@ from hexapod_cosim.extensions.study.records import (
     StudyError,
 )
 from hexapod_cosim.extensions.study.rules import Rules, read_table, require
-from hexapod_cosim.models import HexapodError, unknown_name
+from hexapod_cosim.models import HexapodError
 from hexapod_cosim.models.errors import refuse_path
-from hexapod_cosim.models.files import parse_toml, read_text, reading_toml
+from hexapod_cosim.models.files import parse_toml, path_of, read_text, reading_toml
 from hexapod_cosim.models.schema import Choice, Flag, Text, Whole, expect_table
 
 OF_A_SWEEP = ("factors", "design", "points", "seeds", "controls")  # not of an optimisation
@@ -50,11 +50,8 @@ def load_study(path_or_name: str | Path, *, controls: Sequence[str] = ()) -> Stu
     current folder. Raises StudyError, and ScenarioError for its scenarios.
     """
     refuse_path(path_or_name, "the study", StudyError)
-    path, bundled = Path(path_or_name), list_studies()
-    if not path.suffix and len(path.parts) == 1 and not path.is_file():
-        if str(path_or_name) not in bundled:
-            raise unknown_name("study", str(path_or_name), bundled, error=StudyError)
-        path = bundled[str(path_or_name)]
+    bundled = list_studies()
+    path = path_of(path_or_name, "study", bundled, StudyError)
     with reading_toml(path, kind="study", name="the study", names=list_studies, error=StudyError):
         table = parse_toml(read_text(path))
     where = path.name if path in bundled.values() else str(path)
@@ -179,7 +176,7 @@ def _case(name: str, table: dict[str, Any] | None, study: Study, folder: Path) -
         else:
             place = "scenario"
         table = with_values(table, changes)
-        scenario = scenario_from_table(table, where=place, given=list(changes))
+        scenario = scenario_from_table(table, where=place, given=changes, option="[set] ")
         check_scenario(scenario)
     except HexapodError as error:
         raise placed(error, f"{study.where}: {error.where or name}") from error

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from hexapod_cosim.models.arrays import Array
-from hexapod_cosim.models.errors import RobotError
+from hexapod_cosim.models.errors import RobotError, check_type
 from hexapod_cosim.models.kinematics import foot_positions, inertia_matrix
 from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES, Leg, Link, Robot
 from hexapod_cosim.models.schema import Vector, check_record
@@ -148,6 +148,7 @@ def check_robot(robot: Robot, *, where: str | None = None) -> None:
 
     where: name of the robot's file for messages.
     """
+    check_type(robot, Robot, "a Robot, as of load_robot()", where="robot", error=RobotError)
     at = f"{where or robot.name}: "
     Vector("m/s2", 3).read(robot.gravity, at + "gravity")
     for name in ("torso", "foot", "gait"):

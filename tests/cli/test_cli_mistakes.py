@@ -9,6 +9,7 @@ import pytest
 from command import Call, assert_refused
 
 from hexapod_cosim.cosim.cli import main
+from hexapod_cosim.models import load_robot
 
 
 @pytest.mark.parametrize(
@@ -141,6 +142,23 @@ def test_a_folder_named_like_an_fmu_is_refused_and_left_alone(call: Call, tmp_pa
     folder.mkdir()
     assert_refused(call("export", "-o", folder), "ends in .fmu", str(folder / "athena.fmu"))
     assert list(tmp_path.iterdir()) == [folder]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["simulate", "mine"], "mine: cannot read the scenario: got 'Is a directory'; give the"),
+        (["export", "--robot", "mine"], "mine: cannot read the robot file: got 'Is a directory'"),
+    ],
+)
+def test_a_folder_in_the_place_of_a_file_is_called_a_folder(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine").mkdir()
+    assert_refused(call(*arguments), message)
+    (tmp_path / "athena").mkdir()  # no obstacle to the package's own names
+    assert load_robot("athena").name == "athena"
 
 
 def test_a_folder_of_someone_elses_files_is_left_alone(call: Call, tmp_path: Path) -> None:

@@ -186,7 +186,7 @@ def test_json_is_all_that_is_printed(
             ["report", "foreign"],
             [
                 "damaged or foreign results",
-                "KeyError",
+                "a file without ",
                 "all facts of a run",
                 "run the scenario again",
             ],

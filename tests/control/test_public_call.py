@@ -17,7 +17,15 @@ import pytest
 from command import Call, assert_refused
 
 import hexapod_cosim
-from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Measurement, make_gait
+from hexapod_cosim.controller import (
+    BodyCommand,
+    Controller,
+    JointCommand,
+    LegSolver,
+    Measurement,
+    make_gait,
+    save_gains,
+)
 from hexapod_cosim.cosim.control.new_law import class_name, module_name, write_law
 from hexapod_cosim.cosim.export.plant import export_controller, export_fmu
 from hexapod_cosim.cosim.master.fmu import Fmu
@@ -29,7 +37,14 @@ from hexapod_cosim.cosim.run.runner import Runner
 from hexapod_cosim.cosim.run.single_run import simulate as run_scenario
 from hexapod_cosim.cosim.scenario.reading import load_scenario, scenario_from_table
 from hexapod_cosim.cosim.scenario.tables import read_tables, with_values
-from hexapod_cosim.models import HexapodError, Robot, load_robot, robot_from_table
+from hexapod_cosim.models import (
+    HexapodError,
+    Robot,
+    check_robot,
+    foot_positions,
+    load_robot,
+    robot_from_table,
+)
 
 NEEDS_PUBLIC_CALL = pytest.mark.usefixtures("plant_build")
 SHORT = {"duration": 0.3}
@@ -212,10 +227,14 @@ def test_the_pattern_generator_walks_forward_and_turns(plant_build: Path) -> Non
         ({"gains": 3}, "gains: wrong type of an argument: got 3"),
         ({"settings": {"duratoin": 3}}, "settings: unknown setting: got 'duratoin'"),
         ({"settings": {3: 1}}, "settings: wrong type of an argument: got 3"),
-        (
-            {"settings": {"seed": np.int64(-1)}},
-            "walk_flat.toml: seed: out of range: got np.int64(-1)",
-        ),
+        ({"settings": {"seed": np.int64(-1)}}, "settings: seed: out of range: got np.int64(-1)"),
+        ({"settings": {"seed": 2**70}}, "settings: seed: out of range: got 1180591620717411303424"),
+        ({"settings": {"gait.period": "slow"}}, "settings: gait.period: wrong type: got 'slow'"),
+        ({"settings": {"gait.perod": 1}}, "settings: gait.perod: unknown key: got 'perod'"),
+        ({"settings": {"duration": np.nan}}, "settings: duration: value not allowed: got nan"),
+        ({"settings": {"friction.mew": 1}}, "settings: friction.mew: unknown key: got 'mew'"),
+        ({"settings": {"torso.mas": 1}}, "settings: torso.mas: unknown setting: got 'torso.mas'"),
+        ({"settings": {"events": [{"time": "x"}]}}, "settings: events[0].time: "),
         ({"label": 3}, "label: wrong type of an argument: got 3"),
         ({"fmu": 3}, "fmu: wrong type of an argument: got 3"),
     ],
@@ -255,6 +274,16 @@ def batch(scenarios: Any) -> list[Summary]:
         (make_gait, {"robot": ROBOT, "duty": "half"}, "duty: {}: got 'half'"),
         (make_gait, {"robot": ROBOT, "step_height": "high"}, "step_height: {}: got 'high'"),
         (robot_from_table, {"table": 3, "where": "mine"}, "mine: wrong type: got 3"),
+        (check_robot, {"robot": "athena"}, "robot: {}: got 'athena'"),
+        (foot_positions, {"robot": 3, "angle": np.zeros((6, 3))}, "robot: {}: got 3"),
+        (foot_positions, {"robot": ROBOT, "angle": "folded"}, "angle: {}: got 'folded'"),
+        (foot_positions, {"robot": ROBOT, "angle": [0.0, 1.0]}, "angle: {}: got 'shape (2,)'"),
+        (foot_positions, {"robot": ROBOT, "angle": None}, "angle: {}: got 'None', expected an arr"),
+        (save_gains, {"gains": ROBOT.gait, "path": "g.toml"}, "gains: {}: got Gait("),
+        (save_gains, {"gains": None, "path": "g.toml"}, "gains: {}: got 'nothing (None)'"),
+        (Measurement, {"angle": [0.0, 0.4, 1.8]}, "angle: {}: got 'shape (3,)'"),
+        (Measurement, {"contact": "all"}, "contact: {}: got 'all'"),
+        (LegSolver, {"robot": "athena"}, "robot: {}: got 'athena'"),
     ],
 )
 def test_calls_refuse_arguments_of_another_type(
@@ -293,8 +322,13 @@ def test_numbers_of_numpy_are_settings() -> None:
     assert (plan.duration, type(plan.duration)) == (2.0, float)
 
 
-def test_a_step_without_a_command_is_refused() -> None:
-    robot = load_robot("athena")
-    controller = Controller(robot, period=0.005, gait=make_gait(robot))
+def test_a_step_with_arguments_of_another_type_is_refused() -> None:
+    controller, stand, sensed = Controller(**CONTROLLER), BodyCommand(), Measurement()
     with pytest.raises(HexapodError, match="command: wrong type of an argument: got 'nothing"):
-        controller.step(0.0, None, Measurement())  # type: ignore[arg-type]
+        controller.step(0.0, None, sensed)  # type: ignore[arg-type]
+    with pytest.raises(HexapodError, match="t: wrong type of an argument: got 'now'"):
+        controller.step("now", stand, sensed)  # type: ignore[arg-type]
+    with pytest.raises(HexapodError, match=r"measurement: wrong type of an argument: got \[\]"):
+        controller.step(0.0, stand, [])  # type: ignore[arg-type]
+    with pytest.raises(HexapodError, match="gains: wrong type of an argument: got 'compliant'"):
+        controller.change_control("compliant")  # type: ignore[arg-type]

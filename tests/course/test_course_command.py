@@ -84,11 +84,15 @@ def test_mistakes_are_told_before_anything_is_run(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_result_of_another_course_is_refused(
+def test_an_incomplete_result_and_one_of_another_course_are_refused(
     call: Call, tmp_path: Path, runs: tuple[Run, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     replayed(monkeypatch, runs)
     call("benchmark", *CHOICE, "-o", str(tmp_path / "out"))
+    (tmp_path / "out" / "runs.csv").rename(tmp_path / "runs.csv")
+    refused = call("report", str(tmp_path / "out"))
+    assert_refused(refused, "damaged result: got 'No such file or directory'", "runs.csv")
+    (tmp_path / "runs.csv").rename(tmp_path / "out" / "runs.csv")
     path = tmp_path / "out" / "benchmark.json"
     content = json.loads(path.read_text())
     content["course"]["hash"] = "0" * 64

@@ -91,7 +91,7 @@ def test_wrong_actions_are_refused_and_the_environment_has_not_stepped() -> None
         with pytest.raises(gymnasium.error.ResetNeeded, match="call reset"):
             env.step(np.zeros(18, np.float32))
         env.reset(seed=1)
-        with pytest.raises(gymnasium.error.InvalidAction, match=r"shape \(17,\), expected \(18,\)"):
+        with pytest.raises(gymnasium.error.InvalidAction, match=r"shape \(17,\).*shape \(18,\)"):
             env.step(np.zeros(17, np.float32))
         with pytest.raises(gymnasium.error.InvalidAction, match="expected finite numbers"):
             env.step(np.full(18, np.nan, np.float32))

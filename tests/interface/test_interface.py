@@ -15,6 +15,7 @@ import pytest
 from fmi_plant import ATHENA, GUID
 
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
+from hexapod_cosim.cosim.interface.patterns import with_defaults
 from hexapod_cosim.cosim.interface.plant import load_interface
 from hexapod_cosim.models.errors import HexapodError
 from hexapod_cosim.models.robot import load_robot
@@ -156,6 +157,12 @@ def test_start_values_are_those_of_the_robot() -> None:
 def test_an_unknown_name_is_refused_with_the_nearest_name() -> None:
     with pytest.raises(HexapodError, match=r"LF\.coxa\.angle_ref"):
         ATHENA.references(["LF.coxa.angel_ref"])
+
+
+def test_an_unknown_unit_is_refused_by_the_variable_s_name() -> None:
+    entry = {"name": "torso.shade", "unit": "lux"}
+    with pytest.raises(HexapodError, match=r"interface.toml: torso.shade: unknown unit: got 'lux'"):
+        with_defaults(entry, "output", {"m": {}})
 
 
 def test_a_robot_that_does_not_fit_its_variables_is_refused() -> None:

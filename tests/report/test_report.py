@@ -281,7 +281,7 @@ def test_a_report_bears_the_name_of_the_walk_that_was_run(call: Call, tmp_path: 
     [
         ("run.json", "[]", "no status"),
         ("run.json", '{"hello": 1}', "no status"),
-        ("run.json", '{"status": "completed"}', "KeyError"),
+        ("run.json", '{"status": "completed"}', "a file without walk"),
         ("metrics.json", "3", "a table of metrics"),
         ("scenario.toml", None, "the scenario that was run"),
         ("results.parquet", "no such thing", "results.parquet"),

@@ -230,11 +230,15 @@ def test_the_file_of_all_runs_reads_back_bit_for_bit(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["control,seed\nkinematic,0\n", "control,seed,status\nkinematic,x,completed\n"]
+    ("text", "got"),
+    [
+        ("control,seed\nkinematic,0\n", "a file without status"),
+        ("control,seed,status\nkinematic,x,completed\n", "a file that is no table of runs"),
+    ],
 )
-def test_a_damaged_file_of_runs_is_refused_by_name(tmp_path: Path, text: str) -> None:
+def test_a_damaged_file_of_runs_is_refused_by_name(tmp_path: Path, text: str, got: str) -> None:
     (tmp_path / "seeds.csv").write_text(text)
-    with pytest.raises(HexapodError, match=r"seeds.csv: damaged file.*hexapod compare"):
+    with pytest.raises(HexapodError, match=rf"seeds.csv: damaged file: got '{got}'.*hexapod comp"):
         read_seeds(tmp_path / "seeds.csv")
     with pytest.raises(HexapodError, match=r"missing.csv: no runs by seed"):
         read_seeds(tmp_path / "missing.csv")

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -54,6 +56,25 @@ def test_all_executors_return_the_same_results() -> None:
     with WorkerPool(2) as pool:
         assert list(pool.map(square, TASKS)) == SQUARES
     assert multiprocessing.active_children() == []
+
+
+def test_a_script_that_its_worker_processes_would_run_again_is_refused(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    lines = [
+        "from hexapod_cosim.cosim.run.worker_pool import WorkerPool",
+        "with WorkerPool(2) as pool:",
+        "    print(list(pool.map(abs, [-1, 2])))",
+    ]
+    command = [sys.executable, str(script)]
+    script.write_text("\n".join(lines))
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "worker processes would run the script again: got '" in done.stderr
+    assert 'expected calls below `if __name__ == "__main__":`' in done.stderr
+    lines[1] = f'if __name__ == "__main__":\n  {lines[1]}'
+    script.write_text("\n".join(lines))
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("[1, 2]\n", "")
 
 
 def test_a_task_that_ends_every_process_has_an_error_and_the_others_are_finished() -> None:
