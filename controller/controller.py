@@ -234,7 +234,17 @@ class Controller(Stateful):
         return super().save() | gaits | {"control": (self.gains, self.law)}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Restores a state returned by save(); the following steps repeat exactly."""
+        """Restores a state returned by save(); the following steps repeat exactly.
+
+        Raises ControllerError for anything else.
+        """
+        if missing := self.save().keys() - state.keys():
+            raise ControllerError(
+                "not a controller's state",
+                got=f"no {', '.join(sorted(missing))}",
+                expected="what save() returned",
+                fix="pass it unchanged",
+            )
         control = self.gains, self.law
         if (state["gait"], state["control"]) != (self.gait, control):
             self.gains, self.law = state["control"]
@@ -265,7 +275,7 @@ class Controller(Stateful):
             raise ControllerError(
                 "step out of time",
                 got=t,
-                expected=f"t = {due} s",
+                expected="a finite time [s]" if first else f"t = {due} s",
                 fix="step once per period, or reset the controller",
             )
         command_changed = self.plan.aim(command)

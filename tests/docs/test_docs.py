@@ -345,6 +345,19 @@ def test_the_readme_quotes_the_table_of_the_comparison() -> None:
     ) in text
 
 
+def test_the_page_of_the_papers_control_quotes_the_table_of_the_comparison() -> None:
+    rows = ("slip per metre", "loading rate at touch-down", "electrical cost, with copper loss")
+    walks = [
+        [int(change) for change in changes(law, control, *rows)]
+        for law in ("tanh", "bristle")
+        for control in ("paper", "paper@chosen")
+    ]
+    slip, loading, cost = [f"{min(found)} to {max(found)} %" for found in zip(*walks, strict=True)]
+    text = " ".join((DOCS / "control" / "paper.md").read_text(encoding="utf-8").split())
+    assert f"feet slip by {slip} less than under kinematic control in the same gait" in text
+    assert f"loading rates fall by {loading}, and electrical energy rises by {cost}" in text
+
+
 def test_the_page_of_compliant_control_quotes_the_table_of_the_course() -> None:
     table = written_table(DOCS / "control.md", "compliant")
     cost = {name: int(row["electr. %"].split()[0]) for name, row in table.items()}
