@@ -155,15 +155,14 @@ def _joint_model(torso: Torso, data: Leg, leg: int, joint: int) -> JointModel:
 
 
 def foot_position(leg: Leg, angle: Array) -> Array:
-    """Returns the centre (3,) of the foot's sphere in the torso frame [m] at three joint angles
-    [rad].
-    """
+    """Returns the foot's centre (3,) in the torso frame [m] at three joint angles [rad]."""
     p_T = np.array(leg.hip_position)
     R_TP = axis_rotation(np.array([0.0, 0.0, 1.0]), leg.hip_yaw)
     for link, q in zip(leg.links, angle, strict=True):
         R_PL = axis_rotation(unit_axis(link.axis), q)
         R_TP = R_TL = R_TP @ R_PL  # the link is the next one's parent
-        p_T = p_T + R_TL @ np.array(link.tip)
+        tip_L = np.array(link.tip)
+        p_T = p_T + R_TL @ tip_L
     return p_T
 
 

@@ -141,8 +141,8 @@ def _robot_shapes(
         robot, position, quaternion, np.zeros(3), np.zeros(3), angle, np.zeros_like(angle)
     )
     R_WT = rotation_matrix(bodies[0, 3:7])
-    middle = position - R_WT @ np.array(robot.torso.com)
-    parts = [(float((R_EW @ middle)[2]), _faces(robot, middle, R_WT, R_EW))]
+    middle_W = position - R_WT @ np.array(robot.torso.com)
+    parts = [(float((R_EW @ middle_W)[2]), _faces(robot, middle_W, R_WT, R_EW))]
     for number, body in enumerate(bodies[1:]):
         shape = _link(robot, number // 3, number % 3, body, R_EW)
         parts.append((float(shape.points[:, 2].mean()), [shape]))
@@ -152,12 +152,12 @@ def _robot_shapes(
 def _link(robot: Robot, leg: int, joint: int, body: Array, R_EW: Array) -> Shape:
     """Returns the line from a link's joint to its tip."""
     link, R_WL = robot.legs[leg].links[joint], rotation_matrix(body[3:7])
-    start = body[:3] - R_WL @ np.array(link.com)
-    along = R_WL @ np.array(link.tip)
-    slope = float(along @ LIGHT) / (float(np.linalg.norm(along)) or 1.0)
+    com_L, tip_L = np.array(link.com), np.array(link.tip)
+    start_W, along_W = body[:3] - R_WL @ com_L, R_WL @ tip_L
+    slope = float(along_W @ LIGHT) / (float(np.linalg.norm(along_W)) or 1.0)
     colour = _lit(COLOURS[("coxa", "femur", "tibia")[joint]], math.sqrt(max(1.0 - slope**2, 0.0)))
     radius = THICKNESS[joint] * robot.legs[leg].links[0].length
-    return Shape(np.array([start, start + along]) @ R_EW.T, colour, radius)
+    return Shape(np.array([start_W, start_W + along_W]) @ R_EW.T, colour, radius)
 
 
 def _faces(robot: Robot, middle: Array, R_WT: Array, R_EW: Array) -> list[Shape]:

@@ -185,12 +185,11 @@ def _source(name: str, robot: Robot) -> str:
 
 
 def _start(
-    experiment: Experiment, robot: Robot, zero: Array, values: Mapping[str, float], offset: Array
+    experiment: Experiment, robot: Robot, zero: Array, values: Mapping[str, float], offset_T: Array
 ) -> dict[str, float]:
-    """Returns the initial state: that of the first row, without the zeros of the joints' angles
-    and with the start values that are unknown.
+    """Returns the initial state: the first row's, less joint zeros, plus unknown start values.
 
-    offset: from the centre of mass to the point whose position the log has (3,) [m].
+    offset_T: from the centre of mass to the point whose position the log has (3,) [m].
     """
     log, key = experiment.log, experiment.start_key
     found = initial_state(log, robot)
@@ -200,7 +199,7 @@ def _start(
         found[name] += values.get(f"start.{axis}{key}", 0.0)
     if log.has(vector_names("torso.position")):
         R_WT = rotation_matrix(np.array([found[name] for name in TURN]))
-        offset_W = R_WT @ offset
+        offset_W = R_WT @ offset_T
         for name, value in zip(PLACE, offset_W.tolist(), strict=True):
             found[name] -= value
     yaw = values.get(f"start.yaw{key}", 0.0)

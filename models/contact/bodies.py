@@ -114,10 +114,10 @@ def leg_points(robot: Robot, body: Array) -> Array:
     for leg, data in enumerate(robot.legs):
         femur, tibia = body[JOINTS * leg + 2], body[JOINTS * leg + 3]
         R_WF, R_WS = rotation_matrix(femur[3:7]), rotation_matrix(tibia[3:7])
-        com = np.array(data.links[2].com)
+        com_S, tip_S = np.array(data.links[2].com), np.array(data.links[2].tip)
         points[leg, 0] = femur[0:3] - R_WF @ np.array(data.links[1].com)
-        points[leg, 1] = tibia[0:3] - R_WS @ com
-        points[leg, 2] = tibia[0:3] + R_WS @ (np.array(data.links[2].tip) - com)
+        points[leg, 1] = tibia[0:3] - R_WS @ com_S
+        points[leg, 2] = tibia[0:3] + R_WS @ (tip_S - com_S)
     return points
 
 

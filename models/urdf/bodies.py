@@ -19,9 +19,9 @@ class Member:
     R_BL: Array  # (3, 3) link to body
     position: Array  # (3,) m    of the link's frame in the body's
 
-    def point(self, place: Array) -> Array:
+    def point(self, p_L: Array) -> Array:
         """Returns a point (3,) of the link in the body's frame [m]."""
-        return self.position + self.R_BL @ place
+        return self.position + self.R_BL @ p_L
 
     def moved(self, part: Inertial) -> Inertial:
         """Returns the link's mass, centre of mass and inertia in the body's frame."""

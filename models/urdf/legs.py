@@ -125,8 +125,8 @@ def _leg(
     yaw, R_HC = _yaw(chain[0], R_TC, wanted, plain=np.array_equal(R_BT, np.eye(3)))
     R_HF = R_HC @ R_CF
     R_HS = R_HF @ R_FS
-    foot, radius = foot_of(chain[2].body)
-    end = None if foot is None else R_HS @ foot
+    foot_S, radius = foot_of(chain[2].body)
+    end = None if foot_S is None else R_HS @ foot_S
     tips = (R_HC @ chain[1].position, R_HF @ chain[2].position, end)
     table: dict[str, Any] = {"hip_position": hip.tolist(), "hip_yaw": yaw}
     other_way = []
@@ -136,7 +136,7 @@ def _leg(
         other_way += [branch.joint.name] if sign < 0.0 else []
         table[joint] = _link(branch, R_HL, tip, axis, sign, where)
     names = tuple(branch.joint.name for branch in chain)
-    return FoundLeg(name, table, names, tuple(other_way), radius, foot, chain)
+    return FoundLeg(name, table, names, tuple(other_way), radius, foot_S, chain)
 
 
 def _pattern_yaw(

@@ -66,10 +66,12 @@ static inline void leg_chain(const hxModel *model, const hxPlantMotion *motion, 
                              hxMat3 R_WF, hxMat3 R_WS, hxNumber chain[HX_CHAIN][3][HX_SLOTS]) {
   const hxVec3 femur = hx_link_vec3(motion, 1, HX_R, slot),
                tibia = hx_link_vec3(motion, 2, HX_R, slot);
-  const hxVec3 point[HX_CHAIN] = {
-      hx_add3(femur, hx_mul(R_WF, hx_load_vec3(model->joint[1].point_j, slot))),
-      hx_add3(tibia, hx_mul(R_WS, hx_load_vec3(model->point_B[HX_KNEE], slot))),
-      hx_add3(tibia, hx_mul(R_WS, hx_load_vec3(model->point_B[HX_FOOT], slot)))};
+  const hxVec3 hip_F = hx_load_vec3(model->joint[1].point_j, slot),
+               knee_S = hx_load_vec3(model->point_B[HX_KNEE], slot),
+               foot_S = hx_load_vec3(model->point_B[HX_FOOT], slot);
+  const hxVec3 point[HX_CHAIN] = {hx_add3(femur, hx_mul(R_WF, hip_F)),
+                                  hx_add3(tibia, hx_mul(R_WS, knee_S)),
+                                  hx_add3(tibia, hx_mul(R_WS, foot_S))};
   for (int k = 0; k < HX_CHAIN; ++k) hx_store_vec3(chain[k], slot, point[k]);
 }
 
