@@ -261,7 +261,10 @@ def test_what_the_controller_found_is_told_in_order_with_times_from_the_first_ro
     names = ("time", "controller.LF.absent", "controller.RM.outrun")
     rows = [[7.0, 0.0, 1.0], [7.5, 1.0, 1.0], [8.0, 1.0, 0.0], [8.5, 0.0, 0.0]]
     assert found_faults(Recording(names, np.array(rows))) == [
-        {"time": 0.0, "text": "the command is too fast for the joints of RM: the body walks slower"},
+        {
+            "time": 0.0,
+            "text": "the command is too fast for the joints of RM: the body walks slower",
+        },
         {"time": 0.5, "text": "the controller walks without LF"},
         {"time": 1.0, "text": "the command is no longer too fast for the joints of RM"},
         {"time": 1.5, "text": "the controller walks with LF again"},
