@@ -50,7 +50,7 @@ class Controller(Stateful):
 
     STATE = (
         "plan", "compliant", "paper", "fade", "health", "_start", "_count", "_shown", "_next",
-        "_back",
+        "_returning_leg",
     )  # fmt: skip
 
     def __init__(
@@ -74,7 +74,7 @@ class Controller(Stateful):
         self._asked = gait  # that was asked for; without a leg, another one is walked
         self._build(gait)
         self._next: Gait | None = None  # that the legs change to
-        self._back: int | None = None  # leg that is taken back into service then
+        self._returning_leg: int | None = None  # leg that is taken back into service then
         self.warnings = gains.warnings(robot, period=period) if gains else ()
         self._out = JointCommand()
         self.diagnostics = Diagnostics()
@@ -107,14 +107,15 @@ class Controller(Stateful):
             self.compliant.present = laws.present
         if self.paper is not None and paper is not None:
             self.paper.restore(paper.save())
-        self.plan.adopt(plan, self._back)
-        self._next = self._back = None
+        self.plan.adopt(plan, self._returning_leg)
+        self._next = self._returning_leg = None
 
-    def _change(self, back: int | None = None) -> None:
+    def _change(self, returning_leg: int | None = None) -> None:
         """Begins a change to the gait of the legs in service, with one that comes back (C58)."""
-        absent = self.plan.absence.legs & (np.arange(LEGS) != back)
+        absent = self.plan.absence.legs & (np.arange(LEGS) != returning_leg)
         backwards = self.plan.ramp.target.vx < 0.0
-        self._next, self._back = gait_without(self._asked, absent, backwards=backwards), back
+        self._next = gait_without(self._asked, absent, backwards=backwards)
+        self._returning_leg = returning_leg
         self.plan.end()
 
     def change_gait(self, gait: Gait) -> None:
@@ -145,7 +146,7 @@ class Controller(Stateful):
             return
         there = absence.fold(measurement.angle, health.faulty, health.locked, self._out)
         self.diagnostics.unreachable[...] &= ~absence.legs
-        if there.any() and self._back is None:
+        if there.any() and self._returning_leg is None:
             self._change(int(np.argmax(there)))
 
     def change_control(self, gains: Gains | None, law: str = "compliant") -> None:
@@ -217,7 +218,7 @@ class Controller(Stateful):
 
     def reset(self) -> None:
         """Puts the robot in its stance and clears all memory; the next step is the first."""
-        self._back = None
+        self._returning_leg = None
         if self.gait != self._asked:
             self._build(self._asked)
         for part in (self.compliant, self.paper, self.fade, self.health, self.plan):
@@ -233,7 +234,17 @@ class Controller(Stateful):
         return super().save() | gaits | {"control": (self.gains, self.law)}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Restores a state returned by save(); the following steps repeat exactly."""
+        """Restores a state returned by save(); the following steps repeat exactly.
+
+        Raises ControllerError for anything else.
+        """
+        if missing := self.save().keys() - state.keys():
+            raise ControllerError(
+                "not a controller's state",
+                got=f"no {', '.join(sorted(missing))}",
+                expected="what save() returned",
+                fix="pass it unchanged",
+            )
         control = self.gains, self.law
         if (state["gait"], state["control"]) != (self.gait, control):
             self.gains, self.law = state["control"]
@@ -264,7 +275,7 @@ class Controller(Stateful):
             raise ControllerError(
                 "step out of time",
                 got=t,
-                expected=f"t = {due} s",
+                expected="a finite time [s]" if first else f"t = {due} s",
                 fix="step once per period, or reset the controller",
             )
         command_changed = self.plan.aim(command)

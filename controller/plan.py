@@ -205,20 +205,20 @@ class WalkPlan(Stateful):
             clock.drop()
         return new
 
-    def adopt(self, before: WalkPlan, back: int | None = None) -> None:
+    def adopt(self, before: WalkPlan, returning_leg: int | None = None) -> None:
         """Begins with the standing feet and the command of the plan of another gait (C55).
 
-        back: a leg that is back in service (C58).
+        returning_leg: a leg that is back in service (C58).
         """
         clock = self.paths.clock
         offset, late = clock.offset, clock.late
         self.restore(before.save())
         self.ramp.carry(before.ramp)
         clock.offset, clock.late = offset, late
-        if back is not None:
-            self.absence.take_back(back)
+        if returning_leg is not None:
+            self.absence.take_back(returning_leg)
             clock.absent = self.absence.legs
-        self.now = self.now._replace(feet=self.paths.join(self.now.feet, back))
+        self.now = self.now._replace(feet=self.paths.join(self.now.feet, returning_leg))
         self.after, self.at, self.last, self.cut = None, 0, math.inf, True
         self._set_pace(self.pace.asked)
 
@@ -282,7 +282,8 @@ class WalkPlan(Stateful):
         """Returns loads and geometry at joint speeds (6, 3) [rad/s] for the laws (C15 to C20)."""
         compliant, now, clock = self.compliant, self.now, self.paths.clock
         assert compliant is not None
-        demand = compliant.dynamics.demand(self.motion(), speed, now.posture, self.planner.laden())
+        ratio = self.planner.weight_ratio()
+        demand = compliant.dynamics.demand(self.motion(), speed, now.posture, ratio)
         feet, height, rise = now.plane + now.shift, self.lift(), now.feet.rise
         load = compliant.plan(demand, now.activation, clock, feet=feet, height=height, rise=rise)
         return PresentStep(

@@ -119,15 +119,16 @@ class StepPlanner:
         torso, presence = absence.torso(ahead), absence.presence(ahead)
         sway, compliant = self.sway, self.compliant
         if compliant is not None and sway is not None and sway.acts(compliant.adaptation.narrowing):
-            guess = sway.guess(feet, compliant.adaptation.laden())
+            part = compliant.adaptation.narrowing
+            weight_ratio = compliant.adaptation.planned_weight_ratio()
+            guess = sway.guess(feet, weight_ratio)
             masses = self._stand(value, posture, feet, guess, clock, presence).masses
             assert masses is not None
-            part, laden = compliant.adaptation.narrowing, compliant.adaptation.laden()
-            torso += part * sway.of(guess, masses, laden)
+            torso += part * sway.of(guess, masses, weight_ratio)
         return self._stand(value, posture, feet, torso, clock, presence)
 
-    def laden(self) -> float:
+    def weight_ratio(self) -> float:
         """Returns the weight that moves with the torso over the modelled one [1] (C53)."""
         assert self.sway is not None
         assert self.compliant is not None
-        return self.compliant.adaptation.laden() if self.sway.active else 1.0
+        return self.compliant.adaptation.planned_weight_ratio() if self.sway.active else 1.0

@@ -202,7 +202,7 @@ def _in_si(value: Any, unit: str, where: str) -> Any:
         "wrong unit" if given else "number without unit in quotes",
         got=value,
         expected="a number without a unit" if unit == "1" else f"a value in {' or '.join(scales)}",
-        fix="write a plain number, without quotes"
+        fix=f"write a plain number: {match[1]}"
         if unit == "1"
         else f"a plain number, without quotes, is in {unit}",
         where=where,

@@ -260,7 +260,7 @@ class Compliant(Stateful):
         raised = offset + self.hold.lift
         output.angle_ref[...] = self._correct(output.angle_ref, climb, raised)
         output.torque_ref[...] = laws.torque
-        self.adaptation.weigh(laws.heft)
+        self.adaptation.weigh(laws.limit.weight_ratio)
         self.adaptation.step(laws.torque, laws.needed(), laws.squeeze_share)
         if busy or self.moving:
             rise = (offset - self.offset) * self.per_second

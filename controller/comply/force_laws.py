@@ -23,8 +23,8 @@ from hexapod_cosim.controller.comply.load_plan import LoadPlan
 from hexapod_cosim.controller.gains import TRIPOD_LEGS, Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, along, clamp, square
-from hexapod_cosim.controller.sense.burden import Burden
 from hexapod_cosim.controller.sense.contact_detection import ContactDetector
+from hexapod_cosim.controller.sense.load_limit import LoadLimit
 from hexapod_cosim.controller.sense.touchdown import EARLY, REACH_LIMIT, Landings, Touchdown
 from hexapod_cosim.controller.sense.trust import SensorWatch, Trust, replaced
 
@@ -33,7 +33,7 @@ GRIPPED = 0.99  # 1    of its share: a leg with more carries it
 LOAD_FLOOR = 1e-6  # N    a smaller sum of loads cannot be divided by
 LEAST_SCALE, LARGEST_SCALE = 0.5, 3.0  # 1    measured over modelled weight that is believed
 LIKELY = 1.2  # 1    of its planned load, or a third of the weight: a doubted foot bears no more
-WEIGHED = 0.9  # 1    of the heft, which changes faster: a larger scale has settled
+WEIGHED = 0.9  # 1    of the weight ratio, which changes faster: a larger scale has settled
 CARRYING_SHARE = 0.2  # 1    in thirds of the weight: an awaited foot with more stands
 LARGEST_LEAN = 0.4  # 1    of the depth of the ground: distance of the centre of mass, each axis
 HIGH_SHARE = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
@@ -43,26 +43,26 @@ class ForceLaws(Stateful):
     """Force laws of all feet.
 
     Attributes, (6,) unless stated otherwise:
-        detector, watch, touchdown, landings, burden, trust: components with states.
+        detector, watch, touchdown, landings, limit, trust: components with states.
         load: smoothed load of the feet in thirds of the weight [1].
         torque: (6, 3) feed-forward torques of the servos [N m].
         contact: feet on the ground.
         carrying: feet on the ground that carry so much that the gait clock need not wait for them.
         doubted: sensors that are replaced.
-        misled: feet that follow their paths: their sensors have just been doubted, or all are.
+        open_loop: feet that follow their paths: their sensors have just been doubted, or all are.
         fallback: legs under kinematic control.
         grip: factor on the planned load of a leg that is regaining contact [1].
         regaining: some grip may be below 1 (scalar).
         scale: measured over planned weight (scalar) [1].
         lean: of the measured centre of mass from the modelled one, x + i y (scalar) [m].
         squeeze_share: of the planned squeeze, that the ground holds (scalar) [1].
-        sure: scale, lean and heft before a sensor contradicted the plan (scalars).
+        trusted: scale, lean and weight ratio before a sensor contradicted the plan (scalars).
     """
 
     STATE = (
-        "detector", "watch", "touchdown", "landings", "burden", "trust", "load", "torque",
-        "contact", "carrying", "doubted", "misled", "fallback", "grip", "regaining", "scale",
-        "lean", "squeeze_share", "sure",
+        "detector", "watch", "touchdown", "landings", "limit", "trust", "load", "torque",
+        "contact", "carrying", "doubted", "open_loop", "fallback", "grip", "regaining", "scale",
+        "lean", "squeeze_share", "trusted",
     )  # fmt: skip
 
     def __init__(
@@ -91,7 +91,8 @@ class ForceLaws(Stateful):
         self.watch = SensorWatch(weight, cycle=cycle, period=period)
         self.touchdown = Touchdown(period=period)
         time = gains.support.weight_time
-        self.burden = Burden(most=gains.limits.torque, cycle=cycle, period=period, weight_time=time)
+        most = gains.limits.torque
+        self.limit = LoadLimit(most=most, cycle=cycle, period=period, weight_time=time)
         self.trust = Trust(cycle=cycle, period=period, load_time=gains.support.load_time)
         self.follow_load = 1.0 - math.exp(-period / gains.support.load_time)
         self.follow_cycle = 1.0 - math.exp(-period / cycle)
@@ -102,24 +103,19 @@ class ForceLaws(Stateful):
     def reset(self) -> None:
         """Puts all laws to rest: no torques, all sensors trusted, no offsets."""
         for part in (
-            self.detector, self.watch, self.touchdown, self.landings, self.burden, self.trust
+            self.detector, self.watch, self.touchdown, self.landings, self.limit, self.trust
         ):  # fmt: skip
             part.reset()
         self.load, self.torque = np.zeros(LEGS), np.zeros((LEGS, 3))
         self.contact, self.carrying, self.doubted = np.zeros((3, LEGS), np.bool_)
-        self.misled, self.fallback = np.zeros((2, LEGS), np.bool_)
+        self.open_loop, self.fallback = np.zeros((2, LEGS), np.bool_)
         self.grip, self.regaining = np.ones(LEGS), False
         self.scale, self.lean, self.squeeze_share = 0.0, 0j, 1.0
-        self.sure = 1.0, 0j, 1.0
-
-    @property
-    def heft(self) -> float:
-        """Returns measured over modelled weight [1] (C32)."""
-        return self.burden.heft
+        self.trusted = 1.0, 0j, 1.0
 
     def needed(self) -> float:
         """Returns the torque needed for the measured weight over the torque allowed [1]."""
-        return self.burden.heft * self.burden.peak / self.burden.most
+        return self.limit.weight_ratio * self.limit.peak / self.limit.most
 
     # ------------------------------------------------------------------------------ contacts
 
@@ -148,12 +144,12 @@ class ForceLaws(Stateful):
         total = np.where(high, whole + known - reported, total)
         loaded = plan.standing | plan.awaited
         doubted = self.watch.update(self.detector.contact, total, loaded, high)
-        blind = np.count_nonzero(doubted) >= TRIPOD_LEGS
-        doubted = doubted | blind
+        all_doubted = np.count_nonzero(doubted) >= TRIPOD_LEGS
+        doubted = doubted | all_doubted
         fresh = doubted & ~self.doubted
         if fresh.any():
-            self.scale, self.lean, self.burden.heft = self.sure
-        self.misled = (self.misled | fresh) & doubted & (plan.height <= EARLY) | blind
+            self.scale, self.lean, self.limit.weight_ratio = self.trusted
+        self.open_loop = (self.open_loop | fresh) & doubted & (plan.height <= EARLY) | all_doubted
         self.doubted = doubted
 
     def _meet_ground(self, plan: LoadPlan, met: Array) -> None:
@@ -161,9 +157,9 @@ class ForceLaws(Stateful):
         self.regaining = True
         early = self.landings.early(met, plan.height)
         falling = np.where(early, plan.descent, 0.0)
-        searching = plan.awaited & ~self.misled & ~self.carrying
+        searching = plan.awaited & ~self.open_loop & ~self.carrying
         self.touchdown.step(
-            self.contact, falling, plan.swinging, plan.standing, searching, self.misled
+            self.contact, falling, plan.swinging, plan.standing, searching, self.open_loop
         )
 
     def _examine_contacts(self, plan: LoadPlan, force: Array, reported: Array) -> None:
@@ -194,7 +190,7 @@ class ForceLaws(Stateful):
             return 0.0
         return min(max(-float(along(planned, deviation).sum()) / whole, 0.0), 1.0)
 
-    def _feel(self, plan: LoadPlan, force: Array) -> tuple[Array, float]:
+    def _measure_loads(self, plan: LoadPlan, force: Array) -> tuple[Array, float]:
         """Returns the normal forces (6,) and their sum [N].
 
         It updates trust (C33), smoothed loads (C27) and the held share of the planned squeeze (C52)
@@ -206,7 +202,7 @@ class ForceLaws(Stateful):
         total = float(normal.sum())
         if self.parts.fallback:
             drag = abs(deviation.sum()) / total if total > max(self.settled, LOAD_FLOOR) else 0.0
-            goal = self.trust.step(drag, overburdened=self.burden.overburdened)
+            goal = self.trust.step(drag, overloaded=self.limit.overloaded)
             self.fallback = np.full(LEGS, goal == 0.0)
         self.load = self.load + self.follow_load * (normal / self.share - self.load)
         missing = self._squeeze_lost(plan, deviation)
@@ -233,15 +229,15 @@ class ForceLaws(Stateful):
 
         normal: (6,) measured normal forces [N]; total: their sum [N].
         """
-        if self.scale > WEIGHED * self.burden.heft and not self.watch.contradicted.any():
-            self.sure = self.scale, self.lean, self.burden.heft
+        if self.scale > WEIGHED * self.limit.weight_ratio and not self.watch.contradicted.any():
+            self.trusted = self.scale, self.lean, self.limit.weight_ratio
         if not self.doubted.any():
             ratio = total / max(plan.weight, LOAD_FLOOR)
             scale = min(max(ratio, LEAST_SCALE), LARGEST_SCALE)
             self.scale += self.follow_weight * (scale - self.scale)
-            self.burden.weigh(ratio)
+            self.limit.weigh(ratio)
             self._update_lean(plan, normal, total)
-        self.burden.step(plan.needed, self.scale)
+        self.limit.step(plan.needed, self.scale)
 
     # ---------------------------------------------------------------------------------- joints
 
@@ -258,7 +254,7 @@ class ForceLaws(Stateful):
 
     def _actuate(self, plan: LoadPlan) -> None:
         """Sets the torques of the planned load: trust (own + grip strength scale carry) (C29)."""
-        strength = self.burden.strength if self.parts.limits else 1.0
+        strength = self.limit.strength if self.parts.limits else 1.0
         torque = plan.carry * (strength * self.scale)
         if self.regaining:
             torque = self._restore_grip(plan, torque)
@@ -271,7 +267,7 @@ class ForceLaws(Stateful):
 
     def meets(self) -> Mask:
         """Returns the feet (6,) that have met the ground on their way down (C51)."""
-        return self.contact & ~self.misled & (self.parts.touchdown and self.trust.level == 1.0)
+        return self.contact & ~self.open_loop & (self.parts.touchdown and self.trust.level == 1.0)
 
     def waits(self, landing: Mask, *, waiting: bool) -> bool:
         """Returns whether the gait clock waits for the feet of legs that end their swing (C50).
@@ -282,7 +278,7 @@ class ForceLaws(Stateful):
             return False
         found = self.carrying if waiting else self.contact
         hopeful = self.touchdown.offset > -REACH_LIMIT
-        return bool((landing & ~found & ~self.misled & hopeful).any())
+        return bool((landing & ~found & ~self.open_loop & hopeful).any())
 
     def step(self, plan: LoadPlan, force: Array) -> None:
         """Advances all laws by one period.
@@ -295,6 +291,6 @@ class ForceLaws(Stateful):
         self.landings.update(self.contact, plan.height, plan.swinging)
         if self._contacts_differ(plan):
             self._examine_contacts(plan, force, reported)
-        normal, total = self._feel(plan, force)
+        normal, total = self._measure_loads(plan, force)
         self._update_weight(plan, normal, total)
         self._actuate(plan)

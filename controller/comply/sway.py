@@ -55,28 +55,28 @@ class Sway:
         """Returns whether the torso sways. narrowing: part of the way to the narrow stance [1]."""
         return self.active and narrowing > 0.0
 
-    def _yield_to(self, moment: complex, laden: float) -> complex:
+    def _yield_to(self, moment: complex, ratio: float) -> complex:
         """Returns the way of the torso that gives the robot another sum of m p [kg m].
 
-        laden: measured over modelled weight [1].
+        ratio: measured over modelled weight [1].
         """
         mass = self.dynamics.total_mass
-        x = moment.real / (mass * (laden - self.forward))
-        return complex(x, moment.imag / (mass * (laden - self.aside)))
+        x = moment.real / (mass * (ratio - self.forward))
+        return complex(x, moment.imag / (mass * (ratio - self.aside)))
 
-    def guess(self, feet: PlannedFeet, laden: float) -> complex:
+    def guess(self, feet: PlannedFeet, weight_ratio: float) -> complex:
         """Returns nearly the whole way of the torso, by the shares [m] x + i y, walking frame."""
         away, mass = complex(feet.plane.sum()) - self.home, self.dynamics.total_mass / LEGS
         moment = complex(self.forward * mass * away.real, self.aside * mass * away.imag)
-        return -self._yield_to(moment, laden)
+        return -self._yield_to(moment, weight_ratio)
 
-    def of(self, guess: complex, masses: Masses, laden: float) -> complex:
+    def of(self, guess: complex, masses: Masses, weight_ratio: float) -> complex:
         """Returns the way of the torso in the walking frame [m], x + i y (C54).
 
         The torso sways by the part of it by which the stance is narrowed.
 
-        masses: of a torso that has moved by the guess; laden: measured over modelled weight [1].
+        masses: of a torso that has moved by the guess; weight_ratio: measured over modelled [1].
         """
         moved = complex((self.dynamics.mass * masses.place).sum()) - self.rest
-        moved += laden * self.dynamics.total_mass * guess
-        return guess - self._yield_to(moved, laden)
+        moved += weight_ratio * self.dynamics.total_mass * guess
+        return guess - self._yield_to(moved, weight_ratio)

@@ -37,12 +37,12 @@ class LoadAdaptation(Stateful):
     Attributes:
         work: (6, 3) squares of the feed-forward torques, smoothed over a gait cycle [N2 m2].
         heat: (6, 3) the same, smoothed over a minute [N2 m2].
-        heft: measured over modelled weight, smoothed over a gait cycle [1].
+        weight_ratio: measured over modelled weight, smoothed over a gait cycle [1].
         narrowing: part of the way to the narrow stance [1].
         squeeze: weight of the torques in the planned squeeze [1].
     """
 
-    STATE = ("work", "heat", "heft", "narrowing", "squeeze")
+    STATE = ("work", "heat", "weight_ratio", "narrowing", "squeeze")
 
     def __init__(
         self, *, rating: float, squeeze: float, narrows: bool, cycle: float, period: float
@@ -62,21 +62,21 @@ class LoadAdaptation(Stateful):
     def reset(self) -> None:
         """Sets work and heat of all servos to zero, and the squeeze to that of cool servos."""
         self.work, self.heat = np.zeros((2, LEGS, 3))
-        self.heft, self.narrowing = 1.0, 0.0
+        self.weight_ratio, self.narrowing = 1.0, 0.0
         self.squeeze = self.cool_squeeze
 
-    def weigh(self, heft: float) -> None:
+    def weigh(self, ratio: float) -> None:
         """Advances weight and narrowing by one period (C53).
 
-        heft: measured over modelled weight [1].
+        ratio: measured over modelled weight [1].
         """
-        self.heft += self.follow_work * (heft - self.heft)
+        self.weight_ratio += self.follow_work * (ratio - self.weight_ratio)
         if self.narrows:
-            self.narrowing = min(max((self.heft - MODELLED) / (HEAVY - MODELLED), 0.0), 1.0)
+            self.narrowing = min(max((self.weight_ratio - MODELLED) / (HEAVY - MODELLED), 0.0), 1.0)
 
-    def laden(self) -> float:
+    def planned_weight_ratio(self) -> float:
         """Returns measured over modelled weight, 1 in the wide stance [1] (C53)."""
-        return 1.0 + self.narrowing * (self.heft - 1.0)
+        return 1.0 + self.narrowing * (self.weight_ratio - 1.0)
 
     def step(self, torque: Array, needed: float, squeeze_share: float) -> None:
         """Advances by one period, after weigh() (C45).

@@ -30,7 +30,7 @@ REACH_SPEED = 0.08  # m/s    downwards
 REACH_LIMIT = 0.040  # m
 HOLD_LIMIT = 0.030  # m    upwards: the robots' step height
 GRACE = 0.040  # s    after the planned touch-down, in which a foot may be late
-PATIENCE = 0.025  # s    of the gait clock, in which a foot that it waits for begins to move down
+SEARCH_RAMP = 0.025  # s    of the gait clock, in which a foot that it waits for gains speed
 RETURN_TIME = 0.060  # s    time constant with which an offset vanishes in the swing, or in doubt
 NEGLIGIBLE = 1e-5  # m    a smaller offset is set to 0
 
@@ -65,8 +65,8 @@ class Touchdown(Stateful):
 
     def _moved(self, contact: Mask, falling: Array, swinging: Mask, searching: Mask) -> Array:
         """Returns the next offsets (6,) [m]. Arguments are those of step()."""
-        eager = np.minimum(self.waited / PATIENCE, 1.0) ** 2
-        pace = REACH_SPEED * np.where(self.late > GRACE, 1.0, eager * eager)
+        ramp = np.minimum(self.waited / SEARCH_RAMP, 1.0) ** 2
+        pace = REACH_SPEED * np.where(self.late > GRACE, 1.0, ramp * ramp)
         reached = np.maximum(self.offset - pace * self.period, -REACH_LIMIT)
         raised = np.minimum(self.offset + falling, HOLD_LIMIT)
         in_swing = np.where(contact, np.where(falling > 0.0, raised, self.offset), self._faded())
@@ -80,7 +80,7 @@ class Touchdown(Stateful):
         swinging: Mask,
         loaded: Mask,
         searching: Mask,
-        misled: Mask,
+        open_loop: Mask,
     ) -> None:
         """Advances the offsets by one period (C36).
 
@@ -91,12 +91,12 @@ class Touchdown(Stateful):
             swinging: (6,) legs planned in the air.
             loaded: (6,) legs planned to carry their whole share.
             searching: (6,) feet that the gait clock waits for.
-            misled: (6,) feet whose sensors have just been doubted.
+            open_loop: (6,) feet whose sensors have just been doubted.
         """
-        self.late = np.where(loaded & ~contact & ~misled, self.late + self.period, 0.0)
+        self.late = np.where(loaded & ~contact & ~open_loop, self.late + self.period, 0.0)
         self.waited = np.where(searching, self.waited + self.period, 0.0)
         moved = self._moved(contact, falling, swinging, searching)
-        self.offset = np.where(misled, self._faded(), moved)
+        self.offset = np.where(open_loop, self._faded(), moved)
 
 
 def _least_of_others(values: Array) -> Array:
@@ -112,10 +112,10 @@ class Landings(Stateful):
     Attributes, (6,) each:
         met: height of the path above its end at the last landing [m]; inf before the first one.
         before: the same at the landing before that [m]; 0 before there was one.
-        flew: the foot has left the ground since its last landing.
+        airborne: the foot has left the ground since its last landing.
     """
 
-    STATE = ("met", "before", "flew")
+    STATE = ("met", "before", "airborne")
 
     def __init__(self) -> None:
         self.reset()
@@ -123,7 +123,7 @@ class Landings(Stateful):
     def reset(self) -> None:
         """Removes all recorded landings."""
         self.met, self.before = np.full(LEGS, math.inf), np.zeros(LEGS)
-        self.flew: Mask = np.zeros(LEGS, dtype=np.bool_)
+        self.airborne: Mask = np.zeros(LEGS, dtype=np.bool_)
 
     def update(self, contact: Mask, height: Array, swinging: Mask) -> None:
         """Records the landings of this period.
@@ -133,12 +133,12 @@ class Landings(Stateful):
             height: (6,) of the paths over their ends [m].
             swinging: (6,) legs planned in the air.
         """
-        landed = contact & self.flew
+        landed = contact & self.airborne
         if landed.any():
             self.before = np.where(landed & np.isfinite(self.met), self.met, self.before)
             now = np.where(swinging, np.maximum(height, 0.0), 0.0)
             self.met = np.where(landed, now, self.met)
-        self.flew = (self.flew | swinging) & ~contact
+        self.airborne = (self.airborne | swinging) & ~contact
 
     def expected(self, contact: Mask, height: Array, swinging: Mask) -> Array:
         """Returns the heights (6,) at which the feet are expected to meet the ground [m] (C35).

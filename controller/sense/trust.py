@@ -55,18 +55,18 @@ class Trust(Stateful):
         self.level = 1.0
         self.slide_periods, self.recovery_periods = 0, 0
 
-    def step(self, drag: float, *, overburdened: bool) -> float:
+    def step(self, drag: float, *, overloaded: bool) -> float:
         """Advances the trust by one period (C33) and returns the level that it goes to, 0 or 1.
 
         drag: common tangential force of the feet above the plan, over the normal force [1];
-        overburdened: the robot is far too heavy for its servos.
+        overloaded: the robot is far too heavy for its servos.
         """
         self.slide_periods = self.slide_periods + 1 if drag > SLIDING_DRAG else 0
         if self.slide_periods * self.period > SLIDING_TIME:
             self.recovery_periods = self.calm
         elif self.recovery_periods:
             self.recovery_periods -= 1
-        goal = 0.0 if self.recovery_periods or overburdened else 1.0
+        goal = 0.0 if self.recovery_periods or overloaded else 1.0
         if self.level != goal:
             self.level += self.follow_load * (goal - self.level)
             if abs(goal - self.level) < 1.0 - TRUSTED:

@@ -214,7 +214,7 @@ class FootPaths(Stateful):
         far = np.abs(feet.plane - motion * time - self.aims())
         return float(far[~self.clock.absent].max())
 
-    def join(self, feet: PlannedFeet, back: int | None = None) -> PlannedFeet:
+    def join(self, feet: PlannedFeet, returning_leg: int | None = None) -> PlannedFeet:
         """Begins the walk anew with feet that stand under a moving body (C55).
 
         One leg begins to give up its load: the first of those with which the farthest foot goes
@@ -226,17 +226,17 @@ class FootPaths(Stateful):
             return self._rest(feet.plane)
         least = np.inf
         unloads, offset = clock.unloads, np.array(self.gait.offsets)
-        if back is not None:
-            clock.start_at(0.5 + 0.5 * self.gait.duty + offset - offset[back])
+        if returning_leg is not None:
+            clock.start_at(0.5 + 0.5 * self.gait.duty + offset - offset[returning_leg])
         opposite = clock.absent[::-1] & ~clock.absent
         able = opposite if opposite.any() else ~clock.absent
-        for first in np.flatnonzero(able) if back is None else ():
+        for first in np.flatnonzero(able) if returning_leg is None else ():
             begin = unloads + (offset - offset[first])
             far = self._farthest(feet, begin)
             if far < least - SAME_DISTANCE:
                 least = far
                 clock.start_at(begin)
-        clock.start_standing(back)
+        clock.start_standing(returning_leg)
         self.met = NO_LEG
         return feet
 

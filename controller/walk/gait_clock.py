@@ -69,13 +69,13 @@ class GaitClock(Stateful):
         self.swinging = self.standing = self.lifted = self.stays = self.awaited = NO_LEG
         self.stayed, self.dropped = self.late, NO_LEG
 
-    def start_standing(self, back: int | None) -> None:
+    def start_standing(self, returning_leg: int | None) -> None:
         """Begins the walk anew with legs that all stand (C55), but for one that swings (C58)."""
         self.before, self.waiting, self.ending, self.dropped = 0, False, False, NO_LEG
         self.swinging = self.lifted = self.stays = self.awaited = NO_LEG
         self.standing, self.stayed = self._stands_after(0), self.late
-        if back is not None:
-            self.swinging = np.arange(LEGS) == back
+        if returning_leg is not None:
+            self.swinging = np.arange(LEGS) == returning_leg
             self.stayed = self.stayed & ~self.swinging
 
     # -------------------------------------------------------------------------------- phases

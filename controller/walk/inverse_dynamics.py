@@ -137,7 +137,7 @@ class InverseDynamics:
         )
 
     def _demand_torso(
-        self, total: Wrench, masses: tuple[Masses | None, Masses, Masses | None], laden: float
+        self, total: Wrench, masses: tuple[Masses | None, Masses, Masses | None], ratio: float
     ) -> Wrench:
         """Adds the forces that the torso needs to push, weight, moment and twist (C16, C56)."""
         before, now, after = masses
@@ -148,7 +148,7 @@ class InverseDynamics:
             )
             up = self._acceleration(before.torso_height, now.torso_height, after.torso_height)
             spin = self._acceleration(before.R_WK, now.R_WK, after.R_WK)
-        pushed = (self.torso_mass + (laden - 1.0) * self.total_mass) / laden
+        pushed = (self.torso_mass + (ratio - 1.0) * self.total_mass) / ratio
         push = pushed * acceleration * now.R_WK.conjugate()
         lift = self.torso_mass * (up + self.gravity)
         place, height = now.torso_place, now.torso_height
@@ -205,7 +205,7 @@ class InverseDynamics:
         return np.array((row.real, row.imag, up)).transpose(1, 2, 0)
 
     def demand(
-        self, motion: Neighbours, speed: Array, posture: Posture, laden: float = 1.0
+        self, motion: Neighbours, speed: Array, posture: Posture, weight_ratio: float = 1.0
     ) -> Demand:
         """Returns the demand of the middle one of three steps.
 
@@ -213,13 +213,13 @@ class InverseDynamics:
             motion: the steps.
             speed: (6, 3) joint speeds [rad/s].
             posture: of the torso in the walking frame.
-            laden: measured over modelled weight [1]. The planned loads are scaled by it (C30), but
-                a payload needs no push for the legs, and more for the torso (C56).
+            weight_ratio: measured over modelled weight [1]. The planned loads are scaled by it
+                (C30), but a payload needs no push for the legs, and more for the torso (C56).
         """
         now = motion.masses[1]
         push, lift = self._demand_links(motion.masses)
-        legs = self._add_force((0j, 0.0, 0j, 0.0), push / laden, lift, now.place, now.height)
-        total, weight, moment, twist = self._demand_torso(legs, motion.masses, laden)
+        legs = self._add_force((0j, 0.0, 0j, 0.0), push / weight_ratio, lift, now.place, now.height)
+        total, weight, moment, twist = self._demand_torso(legs, motion.masses, weight_ratio)
         push, lift = posture.turn_back(push, lift)
         torque = self._demand_torques(motion, push, lift, speed)
         lever = self._lever_of(motion.pose[1], posture)

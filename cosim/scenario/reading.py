@@ -44,6 +44,7 @@ from hexapod_cosim.cosim.scenario.sections import (
 )
 from hexapod_cosim.cosim.scenario.tables import read_overrides, read_tables, with_values
 from hexapod_cosim.models import Robot, ScenarioError, load_robot
+from hexapod_cosim.models.errors import check_type
 from hexapod_cosim.models.ground.faces import ground_normal
 from hexapod_cosim.models.ground.surface import Terrain
 from hexapod_cosim.models.ground.table import merged_terrain
@@ -65,6 +66,8 @@ def load_scenario(path_or_name: str | Path, *, overrides: Sequence[str] = ()) ->
 
     Raises ScenarioError.
     """
+    what = "a list of texts NAME=VALUE"
+    check_type(overrides, (list, tuple), what, where="overrides", error=ScenarioError)
     given = read_overrides(overrides)
     table, where = read_tables(path_or_name)
     return scenario_from_table(with_values(table, given), where=where, given=given)

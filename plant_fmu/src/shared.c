@@ -75,7 +75,8 @@ void hx_check_ranges(hxChecker *checker, const void *structure, const hxRange *r
 hxStatus hx_check_end(double time, double t_end, char *message) {
   if (t_end >= time && t_end <= DBL_MAX) return HX_OK;
   hx_print(message, HX_MESSAGE_SIZE,
-           "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end, time);
+           "end of step: got %.17g s, expected a finite time of at least %.17g s; step forwards",
+           t_end, time);
   return HX_INVALID_ARGUMENT;
 }
 

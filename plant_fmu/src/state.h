@@ -314,8 +314,8 @@ enum { HX_MEASURED_LINES = offsetof(hxMeasured, contact_loss) / (HX_SLOTS * size
  *       measured, plastic, moment     measure/: from the old moment to that of the step's end
  *       motion, steps, time
  *       contact, touchdowns           measure/moment.h: switches the contacts that are due
- *     firmware.loaded                 command/command.c: hx_count_overload
- *     call_start, call_input          plant/advance.c */
+ *     call_start, call_input          plant/advance.c
+ *     firmware.loaded                 command/command.c: hx_count_overload */
 typedef struct hxState {
   double time;                      /* s */
   double next_step;                 /* s  step that the error control proposes next */

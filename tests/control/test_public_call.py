@@ -268,6 +268,7 @@ def batch(scenarios: Any) -> list[Summary]:
         (Controller, CONTROLLER | {"period": "5 ms"}, "period: {}: got '5 ms'"),
         (Controller, CONTROLLER | {"gains": "stiff"}, "gains: {}: got 'stiff'"),
         (Controller, CONTROLLER | {"law": None}, "unknown law: expected one of"),
+        (load_scenario, {"path_or_name": "stand", "overrides": "duration=3"}, "overrides: {}: got"),
         (load_robot, {"path_or_name": None}, "path: {}: got 'nothing (None)'"),
         (make_gait, {"robot": "athena"}, "robot: {}: got 'athena'"),
         (make_gait, {"robot": ROBOT, "name": 3}, "name: {}: got 3"),

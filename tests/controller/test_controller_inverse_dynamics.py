@@ -35,10 +35,10 @@ def wave(size: float, rate: float, at: float) -> Callable[[np.ndarray], np.ndarr
 
 
 def moving(
-    robot: Robot, *, turning: float, leaning: float, start: float, laden: float = 1.0
+    robot: Robot, *, turning: float, leaning: float, start: float, weight_ratio: float = 1.0
 ) -> tuple[Motion, Demand]:
     """Returns three time steps of a torso that sways, turns and leans over three standing feet
-    while three others swing. laden: measured over modelled weight [1].
+    while three others swing. weight_ratio: measured over modelled weight [1].
     """
     t = start + PERIOD * np.arange(-1.0, 2.0)
     legs = LegSolver(robot)
@@ -72,7 +72,7 @@ def moving(
         Neighbours((masses[0], masses[1], masses[2]), (before, now, after)),
         speed[1],
         torsos[1],
-        laden,
+        weight_ratio,
     )
     return Motion(PERIOD, way, yaw, posture, angle, speed), demand
 
@@ -109,20 +109,20 @@ def points(robot: Robot, *, link: tuple[float, ...] = POINT) -> Robot:
 STARTS = [0.1, 0.45, 0.77]
 
 
-@pytest.mark.parametrize("laden", [1.0, 1.3, 2.5])
+@pytest.mark.parametrize("weight_ratio", [1.0, 1.3, 2.5])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_push_and_twist_under_a_measured_weight_are_those_of_a_payload_on_the_torso(
-    name: str, laden: float
+    name: str, weight_ratio: float
 ) -> None:
     """Its loads are the planned ones times the weight (C30); joint torques of legs stay (C56)."""
     robot = points(load_robot(name))
-    payload = (laden - 1.0) * float(masses(robot).sum())  # kg
+    payload = (weight_ratio - 1.0) * float(masses(robot).sum())  # kg
     heavier = changed(robot, torso={"mass": robot.torso.mass + payload})
     for start in STARTS:
-        _, planned = moving(robot, turning=1.0, leaning=1.0, start=start, laden=laden)
+        _, planned = moving(robot, turning=1.0, leaning=1.0, start=start, weight_ratio=weight_ratio)
         _, known = moving(heavier, turning=1.0, leaning=1.0, start=start)
-        assert abs(laden * planned.push - known.push) < ROUND_OFF
-        assert abs(laden * planned.twist - known.twist) < ROUND_OFF
+        assert abs(weight_ratio * planned.push - known.push) < ROUND_OFF
+        assert abs(weight_ratio * planned.twist - known.twist) < ROUND_OFF
         assert (planned.torque == known.torque).all()
 
 

@@ -166,22 +166,24 @@ def test_the_squeeze_follows_the_hottest_servo(share: float, expected: float) ->
     assert adaptation.squeeze == pytest.approx(expected, abs=1e-6)
 
 
-def weighed(adaptation: LoadAdaptation, heft: float, *, held: float = LOST) -> LoadAdaptation:
+def weighed(
+    adaptation: LoadAdaptation, weight_ratio: float, *, held: float = LOST
+) -> LoadAdaptation:
     """Returns the adaptation after ten cycles with cool servos and a constant weight."""
     for _ in range(round(10.0 * CYCLE / PERIOD)):
-        adaptation.weigh(heft)
+        adaptation.weigh(weight_ratio)
         adaptation.step(loaded(0.1), 0.5, held)
     return adaptation
 
 
 @pytest.mark.parametrize(
-    ("heft", "narrowing", "squeeze"),
+    ("weight_ratio", "narrowing", "squeeze"),
     [(0.8, 0.0, 0.4), (1.1, 0.0, 0.4), (1.15, 0.5, 0.25), (1.2, 1.0, 0.1), (2.0, 1.0, 0.1)],
 )
 def test_a_weight_above_the_models_narrows_the_stance_and_spares_the_squeeze(
-    heft: float, narrowing: float, squeeze: float
+    weight_ratio: float, narrowing: float, squeeze: float
 ) -> None:
-    found = weighed(make(narrows=True), heft)
+    found = weighed(make(narrows=True), weight_ratio)
     assert (found.narrowing, found.squeeze) == pytest.approx((narrowing, squeeze), abs=1e-3)
 
 

@@ -32,15 +32,17 @@ HEAVY = 1.4  # 1    weight over that of the model
 class Weighed(LoadAdaptation):
     """Knows the weight of a payload and keeps it."""
 
-    def __init__(self, heft: float, narrowing: float) -> None:
+    def __init__(self, weight_ratio: float, narrowing: float) -> None:
         super().__init__(rating=1.0, squeeze=0.6, narrows=True, cycle=1.0, period=PERIOD)
-        self.heft, self.narrowing = heft, narrowing
+        self.weight_ratio, self.narrowing = weight_ratio, narrowing
 
-    def weigh(self, heft: float) -> None:
+    def weigh(self, weight_ratio: float) -> None:
         """Leaves the weight as it is."""
 
 
-def walk(name: str, *, sway: bool, heft: float = HEAVY, narrowing: float = 1.0) -> Controller:
+def walk(
+    name: str, *, sway: bool, weight_ratio: float = HEAVY, narrowing: float = 1.0
+) -> Controller:
     """Returns a controller of an amble whose feet feel nothing, without slow loops."""
     robot = load_robot(name)
     controller = Controller(
@@ -51,7 +53,7 @@ def walk(name: str, *, sway: bool, heft: float = HEAVY, narrowing: float = 1.0) 
         parts=Parts(sway=sway, posture=False, path=False),
     )
     assert controller.compliant is not None
-    controller.compliant.adaptation = Weighed(heft, narrowing)
+    controller.compliant.adaptation = Weighed(weight_ratio, narrowing)
     return unwatched(controller)
 
 
@@ -77,15 +79,15 @@ def pushes(controller: Controller, steps: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-@pytest.mark.parametrize("heft", [1.2, 2.0])
+@pytest.mark.parametrize("weight_ratio", [1.2, 2.0])
 @pytest.mark.parametrize("step", [2e-3 + 0j, 2e-3j])
 def test_the_centre_of_mass_stays_when_feet_move_and_a_torso_with_a_payload_sways(
-    name: str, step: complex, heft: float
+    name: str, step: complex, weight_ratio: float
 ) -> None:
     robot = load_robot(name)
     legs = LegSolver(robot)
     dynamics = InverseDynamics(robot, legs, period=PERIOD)
-    payload = (heft - 1.0) * dynamics.total_mass  # kg
+    payload = (weight_ratio - 1.0) * dynamics.total_mass  # kg
     controller = walk(name, sway=True)
     sway, feet = Sway(dynamics, legs, active=True), controller.plan.now.feet
     x, y, z = dynamics.stance.T
@@ -97,10 +99,10 @@ def test_the_centre_of_mass_stays_when_feet_move_and_a_torso_with_a_payload_sway
         links = (dynamics.mass * masses.ground).sum()
         return complex(links + (dynamics.torso_mass + payload) * masses.torso_ground)
 
-    guess = sway.guess(feet._replace(plane=home + step), heft)
+    guess = sway.guess(feet._replace(plane=home + step), weight_ratio)
     placed = dynamics.place(legs.pose(home + step - guess, z), guess, 0.0, level)
     without = moment(home + step, 0j) - moment(home, 0j)
-    for moved, most in ((guess, 5e-3), (sway.of(guess, placed, heft), 1e-4)):
+    for moved, most in ((guess, 5e-3), (sway.of(guess, placed, weight_ratio), 1e-4)):
         left = moment(home + step, moved) - moment(home, 0j)
         assert abs(left) < most * abs(without)
 
@@ -134,7 +136,7 @@ def test_the_torso_does_not_sway_without_payload_or_part_and_under_other_control
     robot = load_robot("athena")
     for controller in (
         walk("athena", sway=False),
-        walk("athena", sway=True, heft=1.09, narrowing=0.0),
+        walk("athena", sway=True, weight_ratio=1.09, narrowing=0.0),
         Controller(robot, period=PERIOD, gait=make_gait(robot)),
     ):
         for step in range(300):

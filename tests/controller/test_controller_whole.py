@@ -291,6 +291,14 @@ def test_a_step_out_of_time_is_refused(t: float) -> None:
         controller.step(t, BodyCommand(), Measurement())
 
 
+def test_a_first_step_at_no_time_and_a_state_of_nothing_are_refused() -> None:
+    controller = make()
+    with pytest.raises(ControllerError, match=r"got nan, expected a finite time \[s\]"):
+        controller.step(float("nan"), BodyCommand(), Measurement())
+    with pytest.raises(ControllerError, match="not a controller's state: got 'no .*gait"):
+        controller.restore({})
+
+
 @pytest.mark.parametrize("period", [0.0, -0.01, 0.5, float("nan")])
 def test_an_impossible_period_is_refused(period: float) -> None:
     robot = load_robot("athena")

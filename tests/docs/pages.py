@@ -1,15 +1,17 @@
 """Pages of documentation as their readers take them: blocks of code, the commands in them, and
-what these do in a folder.
+what these do in a folder; and syntax trees of the repository's Python.
 """
 
 from __future__ import annotations
 
+import ast
 import io
 import os
 import re
 import subprocess
 import sys
 from contextlib import chdir, redirect_stderr, redirect_stdout
+from functools import cache
 from pathlib import Path
 
 from hexapod_cosim.cosim.cli import main
@@ -29,6 +31,12 @@ MISSING = [
     if not (EXTENSIONS / name).is_dir()
     for command in commands
 ]
+
+
+@cache
+def parsed(path: Path) -> ast.Module:
+    """The syntax tree of a file, which several tests of this room look at."""
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def blocks(page: Path) -> list[tuple[str, str]]:

@@ -11,7 +11,7 @@ import re
 from pathlib import Path
 
 import pytest
-from pages import COMMANDS
+from pages import COMMANDS, parsed
 
 from hexapod_cosim.models import CONTACT_LAWS
 
@@ -153,7 +153,7 @@ def functions_of_the_plant() -> list[tuple[str, str]]:
 
 
 def functions_of_models(module: str) -> set[str]:
-    tree = ast.parse((ROOT / "models" / f"{module}.py").read_text(encoding="utf-8"))
+    tree = parsed(ROOT / "models" / f"{module}.py")
     return {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
 
 

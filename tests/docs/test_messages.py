@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pages import parsed
 
 from hexapod_cosim.cosim.master.recorder import ColumnError, Recording
 from hexapod_cosim.models.errors import nearest_name
@@ -37,10 +38,7 @@ Place = tuple[str, str]
 def _trees() -> dict[str, ast.Module]:
     """The product's modules by path."""
     files = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
-    return {
-        path.relative_to(ROOT).as_posix(): ast.parse(path.read_text(encoding="utf-8"))
-        for path in files
-    }
+    return {path.relative_to(ROOT).as_posix(): parsed(path) for path in files}
 
 
 def _name(node: ast.expr) -> str:

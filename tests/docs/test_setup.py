@@ -13,6 +13,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from pages import parsed
 
 ROOT = Path(__file__).parents[2]
 
@@ -204,7 +205,7 @@ def test_the_extra_for_tests_names_every_package_that_the_tests_import() -> None
 
 def modules(path: Path) -> set[str]:
     """Returns the first names of the modules that a file imports, wherever in it."""
-    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    nodes = list(ast.walk(parsed(path)))
     names = [one.name for node in nodes if isinstance(node, ast.Import) for one in node.names]
     names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
     return {name.partition(".")[0] for name in names}

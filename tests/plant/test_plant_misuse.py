@@ -106,6 +106,14 @@ def test_bodies_or_a_start_time_that_are_no_numbers_are_refused(
         INVALID_ARGUMENT,
         "body state: got a number that is not finite",
     )
+    body = plant.bodies
+    body[7, 3:7] = 0.0
+    refused(
+        plant,
+        lambda: setattr(plant, "bodies", body),
+        INVALID_ARGUMENT,
+        "body state: got a quaternion of zeros",
+    )
     start = definition(plant.robot)
     refused(
         plant, lambda: plant.reset(start, number), INVALID_ARGUMENT, "start time: got .* not finite"

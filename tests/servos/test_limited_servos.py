@@ -262,7 +262,8 @@ def test_the_firmware_remembers_what_the_twin_does_to_the_last_bit(
         rate = setpoint_rate(servo, setpoint, command.angle_ref, h)
         plant.step(end, command)
         output = plant.output()
-        wanted = kp * (setpoint - output.angle) + kd * (command.speed_ref - output.speed)
+        lag = setpoint + h * rate - output.angle
+        wanted = kp * lag + kd * (command.speed_ref - output.speed)
         loaded, start = count_overload(servo, wanted + command.torque_ref, loaded, h), end
         found = remembered(plant)
         assert np.array_equal(found[:3], [setpoint, rate, loaded])

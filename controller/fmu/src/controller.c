@@ -10,7 +10,7 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
   model->paper = definition->control == HX_CONTROL_PAPER;
   hx_walk_plan_compile(definition, &model->plan);
   if (model->paper) hx_paper_compile(definition, &model->corrections);
-  model->feels = definition->control != HX_CONTROL_KINEMATIC;
+  model->watches_servos = definition->control != HX_CONTROL_KINEMATIC;
   hx_fade_compile(definition->period, &model->fade);
   hx_health_compile(definition, &model->health);
 }
@@ -19,16 +19,17 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
 
 void hx_controller_adopt(hxControllerModel model[2], hxControllerState *state) {
   hxControllerModel *next = &model[1 - state->model];
-  if (!state->changing || !hx_walk_plan_ended(&state->plan)) return;
-  hx_walk_plan_adopt(&next->plan, &model[state->model].plan, state->back - 1, &state->plan);
+  if (!state->is_changing_gait || !hx_walk_plan_ended(&state->plan)) return;
+  hx_walk_plan_adopt(&next->plan, &model[state->model].plan, state->returning_leg - 1,
+                     &state->plan);
   state->model = 1 - state->model;
-  state->changing = state->back = 0;
+  state->is_changing_gait = state->returning_leg = 0;
 }
 
-void hx_controller_change(hxControllerModel model[2], int back, hxControllerState *state) {
-  state->changing = 1;
-  state->regait = 0;
-  state->back = back;
+void hx_controller_change(hxControllerModel model[2], int returning_leg, hxControllerState *state) {
+  state->is_changing_gait = 1;
+  state->gait_is_outdated = 0;
+  state->returning_leg = returning_leg;
   hx_controller_adopt(model, state);
 }
 
@@ -131,23 +132,23 @@ static void watch(const hxControllerModel *model, const hxControllerInput *input
     bearing[k] = hx_health_bearing(&state->health, k);
   }
   if (!hx_walk_plan_lose(&model->plan, lost, bearing, &state->output, &state->plan)) return;
-  state->regait = 1;
-  state->changing = state->back = 0;
+  state->gait_is_outdated = 1;
+  state->is_changing_gait = state->returning_leg = 0;
 }
 
 /* Folds legs out of service away, and takes back one that works again (C58). */
 static void fold(const hxControllerModel *model, const hxControllerInput *input,
                  hxControllerState *state) {
-  const int back = hx_absence_fold(&model->plan.absent, model->plan.planner.leg, input->angle,
-                                   (const int (*)[HX_JOINTS])state->health.faulty,
-                                   (const int (*)[HX_JOINTS])state->health.locked,
-                                   &state->plan.absence, &state->output);
+  const int leg = hx_absence_fold(&model->plan.absent, model->plan.planner.leg, input->angle,
+                                  (const int (*)[HX_JOINTS])state->health.faulty,
+                                  (const int (*)[HX_JOINTS])state->health.locked,
+                                  &state->plan.absence, &state->output);
   memcpy(state->output.absent, state->plan.absence.legs, sizeof state->output.absent);
   memcpy(state->output.outrun, state->plan.pace.outrun, sizeof state->output.outrun);
   memcpy(state->output.faulty, state->health.faulty, sizeof state->output.faulty);
-  if (back < 0 || state->back) return;
-  state->back = back + 1;
-  state->regait = 1;
+  if (leg < 0 || state->returning_leg) return;
+  state->returning_leg = leg + 1;
+  state->gait_is_outdated = 1;
   hx_walk_plan_end(&state->plan);
 }
 
@@ -171,7 +172,7 @@ void hx_controller_tick(const hxControllerModel *model, const hxControllerInput 
   const int command_changed = hx_walk_plan_aim(&model->plan, command, &state->plan);
   hxPresentStep present;
   /* the first tick commands the stance, whatever the input */
-  if (state->tick > 0 && model->feels) watch(model, input, state);
+  if (state->tick > 0 && model->watches_servos) watch(model, input, state);
   if (state->tick > 0)
     hx_walk_plan_advance(&model->plan, command_changed, &state->compliant, &state->plan);
   ++state->tick;

@@ -50,8 +50,8 @@ static inline hxPlannedStep *hx_walk_plan_step(hxWalkPlan *plan, int neighbour) 
 
 /* Aims at the share of a command that the joints can follow in the gait (C59). Returns whether the
  * plan no longer applies. */
-HX_SELDOM static int set_pace(const hxWalkPlanModel *model, const double command[HX_COMMANDS],
-                              hxWalkPlan *plan) {
+HX_RARE int set_pace(const hxWalkPlanModel *model, const double command[HX_COMMANDS],
+                     hxWalkPlan *plan) {
   hxStride stride = {.leg = model->planner.leg,
                      .model = &model->paths,
                      .paths = &plan->paths,
@@ -231,13 +231,13 @@ static inline int hx_walk_plan_lose(const hxWalkPlanModel *model, const int lost
 }
 
 /* Goes on with the standing feet and the command in another gait (C55). before: the model of the
- * gait so far; back: a leg that is back in service (C58), -1: none. */
-static HX_SELDOM void hx_walk_plan_adopt(hxWalkPlanModel *model, const hxWalkPlanModel *before,
-                                         int back, hxWalkPlan *plan) {
+ * gait so far; returning_leg: a leg that is back in service (C58), -1: none. */
+HX_RARE void hx_walk_plan_adopt(hxWalkPlanModel *model, const hxWalkPlanModel *before,
+                                int returning_leg, hxWalkPlan *plan) {
   hx_command_ramp_carry(&model->ramp, &before->ramp, &plan->ramp);
-  if (back >= 0) hx_absence_take_back(&model->absent, back, &plan->absence);
+  if (returning_leg >= 0) hx_absence_take_back(&model->absent, returning_leg, &plan->absence);
   memcpy(plan->paths.clock.absent, plan->absence.legs, sizeof plan->absence.legs);
-  hx_foot_paths_join(&model->paths, &plan->paths, &hx_walk_plan_step(plan, 0)->feet, back);
+  hx_foot_paths_join(&model->paths, &plan->paths, &hx_walk_plan_step(plan, 0)->feet, returning_leg);
   plan->has_after = 0;
   plan->at = 0;
   plan->last = INT64_MAX;
@@ -247,8 +247,8 @@ static HX_SELDOM void hx_walk_plan_adopt(hxWalkPlanModel *model, const hxWalkPla
 
 /* Goes on in the phase of the plan under another control, in the same gait. before: the paths'
  * model under the control before. */
-static HX_SELDOM void hx_walk_plan_carry(hxWalkPlanModel *model, const hxFootPathsModel *before,
-                                         hxWalkPlan *plan) {
+HX_RARE void hx_walk_plan_carry(hxWalkPlanModel *model, const hxFootPathsModel *before,
+                                hxWalkPlan *plan) {
   hxGaitClockModel *clock = &model->paths.clock;
   memcpy(clock->offset, before->clock.offset, sizeof clock->offset);
   memcpy(clock->late, before->clock.late, sizeof clock->late);
@@ -342,7 +342,7 @@ static inline void hx_walk_plan_present_step(const hxWalkPlanModel *model,
   hxDemand demand;
   hx_inverse_dynamics_demand(&planner->compliant.dynamics, planner->leg, &motion,
                              (const double (*)[HX_JOINTS])speed, &now->posture,
-                             hx_step_planner_laden(planner, compliant), &demand);
+                             hx_step_planner_weight_ratio(planner, compliant), &demand);
   for (int k = 0; k < HX_LEGS; ++k) {
     load->feet[k] = hx_plane_add(now->plane[k], now->shift[k]);
     height[k] = hx_walk_plan_lift(model, plan, k);

@@ -8,14 +8,6 @@
 #include "hexapod/inside.h"
 #include "transcendental.h"
 
-/* Changes of gait and control are rare: their functions are compiled for size, because wheels
- * contain them for every platform. */
-#if defined(__GNUC__)
-#define HX_SELDOM __attribute__((cold, noinline, unused))
-#else
-#define HX_SELDOM
-#endif
-
 typedef struct hxPlane {
   double x, y;
 } hxPlane;

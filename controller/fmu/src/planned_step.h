@@ -107,20 +107,20 @@ static inline void hx_step_planner_lay_out(const hxStepPlanner *model, const hxG
   for (int k = 0; k < HX_LEGS; ++k) presence[k] = hx_absence_presence(absent, absence, k, ahead);
   step->torso = away;
   if (model->is_compliant && hx_sway_acts(sway, narrowing)) {
-    const double laden = hx_load_adaptation_laden(&compliant->adaptation);
-    step->torso = hx_sway_guess(sway, &step->feet, laden);
+    const double weight_ratio = hx_load_adaptation_planned_weight_ratio(&compliant->adaptation);
+    step->torso = hx_sway_guess(sway, &step->feet, weight_ratio);
     stand(model, clock, presence, step);
     step->torso = hx_plane_add(away, hx_scaled(hx_sway_of(sway, &model->compliant.dynamics,
-                                                          step->torso, &step->masses, laden),
+                                                          step->torso, &step->masses, weight_ratio),
                                                narrowing));
   }
   stand(model, clock, presence, step);
 }
 
 /* Returns the weight that moves with the torso over the modelled one [1] (C53). */
-static inline double hx_step_planner_laden(const hxStepPlanner *model,
-                                           const hxCompliant *compliant) {
-  return model->sway.active ? hx_load_adaptation_laden(&compliant->adaptation) : 1.0;
+static inline double hx_step_planner_weight_ratio(const hxStepPlanner *model,
+                                                  const hxCompliant *compliant) {
+  return model->sway.active ? hx_load_adaptation_planned_weight_ratio(&compliant->adaptation) : 1.0;
 }
 
 #endif

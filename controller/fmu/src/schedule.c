@@ -30,10 +30,10 @@ static hxStatus refuse(hxController *controller, hxStatus status, const char *te
 }
 
 static hxControllerState *present(hxController *controller) {
-  return &controller->state[controller->now];
+  return &controller->state[controller->present];
 }
 static const hxControllerState *state_of(const hxController *controller) {
-  return &controller->state[controller->now];
+  return &controller->state[controller->present];
 }
 
 const char *hx_controller_message(const hxController *controller) { return controller->message; }
@@ -76,17 +76,17 @@ const hxGait *hx_controller_gait(const hxController *controller) {
   return &controller->definition.gait;
 }
 
-/* Begins a change to the gait of the legs in service, with one that comes back (C58). back: as in
- * the state. */
-static void change(hxController *controller, int back) {
+/* Begins a change to the gait of the legs in service, with one that comes back (C58).
+ * returning_leg: as in the state. */
+static void change(hxController *controller, int returning_leg) {
   hxControllerState *state = present(controller);
   hxControllerDefinition definition = controller->definition;
   int absent[HX_LEGS];
   memcpy(absent, state->plan.absence.legs, sizeof absent);
-  if (back) absent[back - 1] = 0;
+  if (returning_leg) absent[returning_leg - 1] = 0;
   hx_gait_without(&definition.gait, (const int *)absent, state->plan.ramp.target[0] < 0.0);
   hx_controller_compile(&definition, &controller->model[1 - state->model]);
-  hx_controller_change(controller->model, back, state);
+  hx_controller_change(controller->model, returning_leg, state);
 }
 
 hxStatus hx_controller_change_gait(hxController *controller, const hxGait *gait) {
@@ -135,7 +135,7 @@ hxStatus hx_controller_change_control(hxController *controller, int control) {
     return refuse(controller, status, message);
   }
   compile_again(controller, &controller->model[state->model]);
-  if (state->changing) compile_again(controller, &controller->model[1 - state->model]);
+  if (state->is_changing_gait) compile_again(controller, &controller->model[1 - state->model]);
   if (state->tick > 0) {
     hx_controller_exchange(&controller->model[state->model], &paths, state);
   } else {
@@ -163,7 +163,7 @@ static int is_finite(const hxControllerOutput *output) {
  * is there, and returns it. Inputs consist of doubles only. */
 static const hxControllerState *tick_ahead(hxController *controller,
                                            const hxControllerInput *input) {
-  hxControllerState *next = &controller->state[1 - controller->now];
+  hxControllerState *next = &controller->state[1 - controller->present];
   if (controller->is_ahead && memcmp(&controller->input, input, sizeof *input) == 0) return next;
   controller->is_ahead = 1;
   controller->input = *input;
@@ -184,7 +184,7 @@ void hx_controller_output(hxController *controller, const hxControllerInput *inp
 static void tick(hxController *controller, const hxControllerInput *input, int first) {
   if (first) {
     tick_ahead(controller, input);
-    controller->now = 1 - controller->now;
+    controller->present = 1 - controller->present;
   } else {
     hx_controller_tick(model_of(controller), input, present(controller));
   }
@@ -194,7 +194,7 @@ static void tick(hxController *controller, const hxControllerInput *input, int f
 hxStatus hx_controller_step(hxController *controller, const hxControllerInput *input,
                             const hxControllerInput *rate, double t_end) {
   enum { REALS = sizeof *input / sizeof(double) };
-  const int before = controller->now;
+  const int before = controller->present;
   const double start = state_of(controller)->time;
   hxStatus status = hx_check_end(start, t_end, controller->message);
   if (status == HX_OK) status = hx_controller_input_check(input, controller->message);
@@ -202,13 +202,14 @@ hxStatus hx_controller_step(hxController *controller, const hxControllerInput *i
   while (t_end - next_tick(controller) > clock_tolerance * model_of(controller)->plan.period) {
     hxControllerInput ramped;
     if (rate) hx_ramp(input, rate, fmax(next_tick(controller) - start, 0.0), REALS, &ramped);
-    tick(controller, rate ? &ramped : input, controller->now == before);
+    tick(controller, rate ? &ramped : input, controller->present == before);
     if (is_finite(&state_of(controller)->output)) {
-      if (state_of(controller)->regait) change(controller, state_of(controller)->back);
+      if (state_of(controller)->gait_is_outdated)
+        change(controller, state_of(controller)->returning_leg);
       hx_controller_adopt(controller->model, present(controller));
       continue;
     }
-    controller->now = before;
+    controller->present = before;
     return refuse(
         controller, HX_NOT_FINITE,
         "joint commands: got numbers that are not finite, expected a command that legs can follow");

@@ -12,9 +12,10 @@
 
 HX_HIDDEN_BEGIN
 
+/* Constants, by controller.c: hx_controller_compile(), with the compile functions of the parts. */
 typedef struct hxControllerModel {
-  int paper; /* the paper's control; otherwise compliant or kinematic control */
-  int feels; /* not kinematic control: its servos are watched */
+  int paper;          /* 1: the paper's control; 0: compliant or kinematic control */
+  int watches_servos; /* 1: servos that do not work are searched for: all but kinematic control */
   hxGait gait;
   hxWalkPlanModel plan;
   hxPaperModel corrections; /* of the paper's control */
@@ -23,19 +24,23 @@ typedef struct hxControllerModel {
 } hxControllerModel;
 
 typedef struct hxControllerState {
+  /* controller.c: hx_controller_begin() */
   double start; /* s  time of the first tick */
-  double time;  /* s */
-  int64_t tick; /* number of the next tick */
-  hxWalkPlan plan;
-  hxCompliant compliant;
-  hxPaper paper;
-  hxFade fade;  /* from the control before */
-  int model;    /* index of the present model; the other one is that of the next gait */
-  int changing; /* to the other model */
-  hxHealth health;
-  int regait; /* the legs in service have changed: the other model is to be that of their gait */
-  int back;   /* leg that is taken back into service with the next gait, counted from 1; 0: none */
+  /* schedule.c: hx_controller_step() */
+  double time; /* s */
+  /* controller.c: hx_controller_tick() */
+  int64_t tick;              /* 1  number of the next tick */
+  hxWalkPlan plan;           /* by plan.h */
+  hxHealth health;           /* by sense/health.h */
+  hxCompliant compliant;     /* by comply/compliant.h */
+  hxPaper paper;             /* by comply/paper.h */
+  hxFade fade;               /* by walk/fade.h  from the control before */
+  int gait_is_outdated;      /* 1: the legs in service have changed, their gait is to follow */
   hxControllerOutput output; /* of the last tick */
+  /* controller.c: hx_controller_change() and hx_controller_adopt() */
+  int model;            /* 1  index of the present model; the other one is that of the next gait */
+  int is_changing_gait; /* 1: to that of the other model */
+  int returning_leg;    /* 1  leg that is in service again in the next gait, from 1; 0: none */
 } hxControllerState;
 
 struct hxController {
@@ -44,9 +49,9 @@ struct hxController {
   /* the present state, and the other one: the next tick's, computed early for its outputs, or that
    * before a step, which one that fails restores. It is not part of the controller's state */
   hxControllerState state[2];
-  int now;      /* index of the present state */
-  int is_ahead; /* the other state is that after the next tick under `input` */
-  hxControllerInput input;
+  int present;             /* 1  index of the present state */
+  int is_ahead;            /* 1: the other state is that after the next tick under `input` */
+  hxControllerInput input; /* of that tick */
   char message[HX_MESSAGE_SIZE];
 };
 
@@ -59,8 +64,8 @@ void hx_controller_begin(const hxControllerModel *model, double t, hxControllerS
  * the gait is being changed (C55). The models differ in their gaits only. */
 void hx_controller_adopt(hxControllerModel model[2], hxControllerState *state);
 
-/* Begins a change to the gait of the other model (C55). back: as in the state. */
-void hx_controller_change(hxControllerModel model[2], int back, hxControllerState *state);
+/* Begins a change to the gait of the other model (C55). returning_leg: as in the state. */
+void hx_controller_change(hxControllerModel model[2], int returning_leg, hxControllerState *state);
 
 /* Goes on under another control, which the present model has been compiled for, in the present
  * phase of the walk: the plan keeps its state, the laws begin anew, and the joint commands fade

@@ -137,8 +137,6 @@ class _State:
         if np.any(servo.goal_speed_max):
             goal = self.setpoint + h * setpoint_rate(servo, self.setpoint, goal, h)
         self.setpoint = goal
-        wanted = servo.kp * (self.setpoint - self.angle)
-        self.loaded = count_overload(servo, wanted, self.loaded, h)
         power = Power(supply, supply * overload_share(servo, self.loaded), on)
         rest = np.zeros(())  # commands of speed and torque
         motor = servo_torque(servo, self.angle, self.speed, self.setpoint, rest, rest, power=power)
@@ -150,6 +148,8 @@ class _State:
         speed = _ending(driven, inertia + brake + servo.viscous_friction, budget, servo)
         self.angle = self.angle + 0.5 * h * (self.speed + speed)
         self.speed = speed
+        wanted = servo.kp * (self.setpoint - self.angle)
+        self.loaded = count_overload(servo, wanted, self.loaded, h)
         back = back_emf_damping(servo) * self.speed
         return (motor + back) / position_gain(servo, 1.0) / supply * on
 

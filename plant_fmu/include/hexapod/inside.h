@@ -22,4 +22,12 @@
 #define HX_HIDDEN_END
 #endif
 
+/* Functions that few robots, grounds and periods need stay out of line, so that the rest costs the
+ * same with and without them. */
+#if defined(__GNUC__)
+#define HX_RARE static __attribute__((noinline, unused))
+#else
+#define HX_RARE static
+#endif
+
 #endif

@@ -29,8 +29,8 @@ void hx_setpoints(hxCommand *command, const hxModel *model, const hxState *state
  * angles until t_end, s. */
 void hx_follow_goals(const hxCommand *goal, const hxModel *model, hxState *state, double t_end);
 
-/* Counts a time, s, of the duties under a command at the last moment that are above the overload
- * limit (eq. 58). */
+/* Adds a call's length h, s, to the times of the duties that are above the overload limit under its
+ * last command, at the last moment (eq. 58). */
 void hx_count_overload(const hxCommand *command, const hxModel *model, hxState *state, double h);
 
 /* Sets what the motors get from their supply in a command: the shares of their duty limits by the

@@ -369,7 +369,7 @@ static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, con
     fill_motion_slots(&state->motion);
     hx_fill_moment_slots(model, state);
   }
-  hx_fill_integral_slots(state);
+  fill_lines(&state->measured, HX_MEASURED_LINES);
   return status;
 }
 

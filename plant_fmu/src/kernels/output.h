@@ -117,15 +117,18 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *m
   return model->pair_rows ? sum + pair_elastic_energy(work) : sum;
 }
 
+/* Returns the share of a winding's rise over the air that is left up to temperature_max. */
+static hxNumber remaining_rating(const hxHeat *heat, hxNumber winding) {
+  const hxNumber left = (heat->max - winding) / (heat->max - heat->air);
+  return hx_lane(hx_clip(hx_splat(left), hx_splat(0.0), hx_splat(1.0)), 0);
+}
+
 /* Fills the temperatures of a joint's servo. */
 static void fill_heat(const hxModel *model, const hxState *state, int leg, int joint, hxOutput *o) {
-  const hxHeat *heat = &model->heat;
   const hxNumber winding = state->measured.winding[joint][leg];
   o->winding_temperature[leg][joint] = winding;
   o->housing_temperature[leg][joint] = state->measured.housing[joint][leg];
-  const hxNumber left = (heat->max - winding) / (heat->max - heat->air);
-  o->remaining_rating[leg][joint] =
-      hx_lane(hx_clip(hx_splat(left), hx_splat(0.0), hx_splat(1.0)), 0);
+  o->remaining_rating[leg][joint] = remaining_rating(&model->heat, winding);
 }
 
 /* Fills what a joint's force depends on, and the motor's torque. */

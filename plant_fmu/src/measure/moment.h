@@ -236,15 +236,10 @@ static inline void hx_fill_moment_slots(const hxModel *model, hxState *state) {
       fill_lines(&state->moment.contact[model->row[k]], HX_CONTACT_LINES);
 }
 
-/* Copies leg 0 into the unused slots of integrals and peaks. */
-static inline void hx_fill_integral_slots(hxState *state) {
-  fill_lines(&state->measured, HX_MEASURED_LINES);
-}
-
 /* Copies leg 0 into the unused slots of all measurements. */
 static inline void hx_fill_measured_slots(const hxModel *model, hxState *state) {
   hx_fill_moment_slots(model, state);
-  hx_fill_integral_slots(state);
+  fill_lines(&state->measured, HX_MEASURED_LINES);
 }
 
 /* Sets whether each foot touches the ground, by any of its rows. */

@@ -20,14 +20,11 @@
 #include "../state.h"
 
 /* Functions of one row of contacts are inline for the feet's first row, HX_INLINE; those for rows
- * that few robots and grounds have stay out of line, HX_RARE, so that flat ground costs the same
- * with and without them. */
+ * that few robots and grounds have are HX_RARE. */
 #if defined(__GNUC__)
 #define HX_INLINE static inline __attribute__((always_inline))
-#define HX_RARE static __attribute__((noinline))
 #else
 #define HX_INLINE static inline
-#define HX_RARE static
 #endif
 
 #ifndef HX_TANGENT

@@ -68,19 +68,26 @@ static void follow_goals(hxPlant *plant, int resumes, double t_end, hxCommand *c
   memcpy(ramp->angle, firmware->rate, sizeof ramp->angle);
 }
 
+/* Moves a command along its change per second up to a time, s. */
+static void move_command(hxCommand *command, const hxCommand *ramp, double time) {
+  enum { SIZE = sizeof(hxCommand) / sizeof(double) };
+  const double elapsed = time - command->time, *rate = (const double *)ramp;
+  double *to = (double *)command;
+  for (int i = 0; i < SIZE; ++i) to[i] += elapsed * rate[i];
+  command->time = time;
+}
+
 /* Sets a part's command, and in *ramp its change per second; servos on a bus hold theirs. Returns
  * the part's end, at most t_end, s. */
 static double part_command(hxPlant *plant, const hxStepCall *call, int resumes, double t_end,
                            hxCommand *command, hxCommand *ramp) {
-  enum { SIZE = sizeof(hxCommand) / sizeof(double) };
   hxState *state = &plant->state;
-  const double elapsed = state->time - call->start;
-  hx_command_from_input(command, call->input, resumes ? state->call_start : state->time);
-  if (hx_has_bus(&plant->model)) {
-    double *to = (double *)command;
-    const double time = command->time, *rate = (const double *)call->ramp;
-    for (int i = 0; call->ramp && i < SIZE; ++i) to[i] += elapsed * rate[i];
-    command->time = time;
+  const double begin = resumes ? state->call_start : state->time;
+  const int has_bus = hx_has_bus(&plant->model);
+  hx_command_from_input(command, call->input, has_bus ? call->start : begin);
+  if (has_bus) {
+    move_command(command, ramp, state->time);
+    command->time = begin;
     hx_bus_send(command, &plant->model, state);
     memset(ramp, 0, HX_JOINT_COMMANDS);
   }
@@ -106,10 +113,11 @@ static hxStatus advance_part(hxPlant *plant, const hxStepCall *call, double t_en
   const double end = part_command(plant, call, resumes, t_end, &command, &ramp);
   const hxStatus status = hx_kernel()->integrate(&plant->model, &command, moves ? &ramp : NULL, end,
                                                  events, state, plant->scratch, plant->message);
-  hx_count_overload(&command, &plant->model, state, state->time - begin);
   const int interrupted = state->time < end;
   state->call_input = interrupted ? call->fingerprint : 0.0;
   state->call_start = interrupted ? command.time : 0.0;
+  move_command(&command, &ramp, state->time);
+  hx_count_overload(&command, &plant->model, state, state->time - begin);
   return status;
 }
 

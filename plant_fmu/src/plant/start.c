@@ -12,9 +12,10 @@
 hxStatus hx_plant_check_terrain(hxPlant *plant, const hxDefinition *d, char *message) {
   if (d->terrain.kind != HX_TERRAIN_GRID) return HX_OK;
   if (!plant->terrain) {
-    hx_print(message, HX_MESSAGE_SIZE,
-             "terrain.kind: got grid, expected a grid; load one and set it before the reset "
-             "(hx_plant_set_terrain), or choose flat or slope");
+    hx_print(
+        message, HX_MESSAGE_SIZE,
+        "terrain.kind: got grid and no loaded terrain, expected one; load it and set it before the "
+        "reset (hx_plant_set_terrain), or choose flat or slope");
     return HX_INVALID_MODEL;
   }
   const double radius = fmax(fmax(d->foot_radius, d->body.corner_radius),

@@ -253,7 +253,7 @@ static inline void hx_compliant_step(const hxCompliantModel *model, const hxLegS
   }
   if (busy || compliant->moving) compliant->moving = busy;
   const double needed = hx_force_laws_needed(&model->laws, laws);
-  hx_load_adaptation_weigh(&model->adaptation, hx_force_laws_heft(laws), &compliant->adaptation);
+  hx_load_adaptation_weigh(&model->adaptation, laws->limit.weight_ratio, &compliant->adaptation);
   hx_load_adaptation_step(&model->adaptation, (const double (*)[HX_JOINTS])laws->torque, needed,
                           laws->squeeze_share, &compliant->adaptation);
 }

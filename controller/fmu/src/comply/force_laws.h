@@ -3,8 +3,8 @@
 #ifndef HX_FORCE_LAWS_H
 #define HX_FORCE_LAWS_H
 
-#include "../sense/burden.h"
 #include "../sense/contact_detection.h"
+#include "../sense/load_limit.h"
 #include "../sense/touchdown.h"
 #include "../sense/trust.h"
 #include "load_plan.h"
@@ -13,7 +13,7 @@
 typedef struct hxForceLawsModel {
   hxParts parts;
   hxSensorWatchModel watch;
-  hxBurdenModel burden;
+  hxLoadLimitModel limit;
   hxTrustModel trust;
   double period; /* s */
   /* N  of the robot; a third of it; load of all feet from which on they have settled */
@@ -29,7 +29,7 @@ typedef struct hxForceLaws {
   hxSensorWatch watch;
   hxTouchdown touchdown;
   hxLandings landings;
-  hxBurden burden;
+  hxLoadLimit limit;
   hxTrust trust;
   int felt[HX_LEGS];                 /* the foot's sensor reports a contact */
   int contact[HX_LEGS];              /* the foot is on the ground */
@@ -37,16 +37,16 @@ typedef struct hxForceLaws {
   double load[HX_LEGS];              /* 1    smoothed, in thirds of the weight */
   double torque[HX_LEGS][HX_JOINTS]; /* N m  for the servos */
   int doubted[HX_LEGS];              /* the foot's sensor is replaced */
-  int misled[HX_LEGS];  /* the foot follows its path: it has just been doubted, or all are */
-  int fallback;         /* kinematic control: the robot slides or is far too heavy */
-  double grip[HX_LEGS]; /* 1  factor on the planned load of a leg that is regaining contact */
-  int regaining;        /* some grip may be below 1 */
-  double scale;         /* 1    measured over planned weight */
+  int open_loop[HX_LEGS]; /* the foot follows its path: its sensor is newly doubted, or all are */
+  int fallback;           /* kinematic control: the robot slides or is far too heavy */
+  double grip[HX_LEGS];   /* 1  factor on the planned load of a leg that is regaining contact */
+  int regaining;          /* some grip may be below 1 */
+  double scale;           /* 1    measured over planned weight */
   hxPlane lean;         /* m  of the measured centre of mass from the modelled one, walking frame */
   double squeeze_share; /* 1  of the planned squeeze, that the ground holds, smoothed */
-  /* scale, heft and lean before a sensor contradicted the plan */
-  double sure_scale, sure_heft;
-  hxPlane sure_lean;
+  /* scale, weight ratio and lean before a sensor contradicted the plan */
+  double trusted_scale, trusted_weight_ratio;
+  hxPlane trusted_lean;
 } hxForceLaws;
 
 /* 1  of the weight: feet that carry less in all have only just met the ground */
@@ -61,14 +61,13 @@ static const double largest_lean = 0.4;
 static const double high_share = 0.25;
 /* 1  of its planned load, or a third of the weight: a doubted foot bears no more */
 static const double likely = 1.2;
-/* 1  of the heft, which changes faster: a larger scale has settled */
+/* 1  of the weight ratio, which changes faster: a larger scale has settled */
 static const double weighed = 0.9;
 /* 1  in thirds of the weight: an awaited foot with more stands */
 static const double carrying_share = 0.2;
 
-enum {
-  HX_TRIPOD_LEGS = 3
-}; /* legs that share the weight in the hardest gait: loads are counted in weight / 3 */
+/* legs that share the weight in the hardest gait: loads are counted in weight / 3 */
+enum { HX_TRIPOD_LEGS = 3 };
 
 /* weight: of the robot [N]; depth: of the ground below the torso's origin in the stance [m]. */
 static inline void hx_force_laws_compile(const hxControllerDefinition *definition, double weight,
@@ -82,7 +81,7 @@ static inline void hx_force_laws_compile(const hxControllerDefinition *definitio
   model->settled = settled_share * model->weight;
   model->most_lean = largest_lean * depth;
   hx_sensor_watch_compile(model->weight, cycle, period, &model->watch);
-  hx_burden_compile(definition, &model->burden);
+  hx_load_limit_compile(definition, &model->limit);
   hx_trust_compile(definition, &model->trust);
   model->high = high_share * definition->gait.step_height;
   model->follow_load = 1.0 - hx_decay(-period / gains->support.load_time);
@@ -93,18 +92,15 @@ static inline void hx_force_laws_compile(const hxControllerDefinition *definitio
 
 static inline void hx_force_laws_reset(hxForceLaws *laws) {
   memset(laws, 0, sizeof *laws);
-  laws->trust.level = laws->squeeze_share = laws->sure_scale = laws->sure_heft = 1.0;
+  laws->trust.level = laws->squeeze_share = laws->trusted_scale = laws->trusted_weight_ratio = 1.0;
   hx_landings_reset(&laws->landings);
-  hx_burden_reset(&laws->burden);
+  hx_load_limit_reset(&laws->limit);
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->grip[leg] = 1.0;
 }
 
-/* Returns measured over modelled weight [1] (C32). */
-static inline double hx_force_laws_heft(const hxForceLaws *laws) { return laws->burden.heft; }
-
 /* Returns the torque needed for the measured weight over the torque allowed [1]. */
 static inline double hx_force_laws_needed(const hxForceLawsModel *model, const hxForceLaws *laws) {
-  return laws->burden.heft * laws->burden.peak / model->most;
+  return laws->limit.weight_ratio * laws->limit.peak / model->most;
 }
 
 /* ----------------------------------------------------------------------------------- contacts */
@@ -157,18 +153,19 @@ static inline void judge_sensors(const hxForceLawsModel *model, const hxLoadPlan
   }
   hx_sensor_watch_update(&model->watch, laws->felt, total, due, high, &laws->watch);
   for (int leg = 0; leg < HX_LEGS; ++leg) count += laws->watch.left[leg] > 0.0;
+  const int all_doubted = count >= HX_TRIPOD_LEGS;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int blind = count >= HX_TRIPOD_LEGS, doubted = blind || laws->watch.left[leg] > 0.0,
+    const int doubted = all_doubted || laws->watch.left[leg] > 0.0,
               now = doubted && !laws->doubted[leg];
-    laws->misled[leg] =
-        blind || ((laws->misled[leg] || now) && doubted && plan->height[leg] <= hx_early);
+    laws->open_loop[leg] =
+        all_doubted || ((laws->open_loop[leg] || now) && doubted && plan->height[leg] <= hx_early);
     laws->doubted[leg] = doubted;
     fresh |= now;
   }
   if (!fresh) return;
-  laws->scale = laws->sure_scale;
-  laws->lean = laws->sure_lean;
-  laws->burden.heft = laws->sure_heft;
+  laws->scale = laws->trusted_scale;
+  laws->lean = laws->trusted_lean;
+  laws->limit.weight_ratio = laws->trusted_weight_ratio;
 }
 
 /* Adapts the paths to ground that is met early or late (C36). */
@@ -180,10 +177,10 @@ static inline void meet_ground(const hxForceLawsModel *model, const hxLoadPlan *
   hx_landings_early(&laws->landings, met, plan->height, early);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     falling[leg] = early[leg] ? plan->descent[leg] : 0.0;
-    searching[leg] = plan->awaited[leg] && !laws->misled[leg] && !laws->carrying[leg];
+    searching[leg] = plan->awaited[leg] && !laws->open_loop[leg] && !laws->carrying[leg];
   }
   hx_touchdown_step(model->period, laws->contact, falling, plan->swinging, plan->standing,
-                    searching, laws->misled, &laws->touchdown);
+                    searching, laws->open_loop, &laws->touchdown);
 }
 
 /* Decides between a wrong sensor and ground that is met early or late; as for judge_sensors. */
@@ -227,9 +224,9 @@ static inline double squeeze_lost(const hxLoadPlan *plan, const hxPlane deviatio
 /* Computes the normal forces and returns their sum [N]. Updates trust (C33), the smoothed loads
  * (C27) and the share of the planned squeeze that is held (C52) by the deviations of the tangential
  * forces (C24). */
-static inline double feel(const hxForceLawsModel *model, const hxLoadPlan *plan,
-                          const double force[HX_LEGS][3], double normal[HX_LEGS],
-                          hxForceLaws *laws) {
+static inline double measure_loads(const hxForceLawsModel *model, const hxLoadPlan *plan,
+                                   const double force[HX_LEGS][3], double normal[HX_LEGS],
+                                   hxForceLaws *laws) {
   hxPlane common = {0.0, 0.0}, deviation[HX_LEGS];
   double total = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -245,7 +242,7 @@ static inline double feel(const hxForceLawsModel *model, const hxLoadPlan *plan,
   if (model->parts.fallback)
     laws->fallback =
         hx_trust_step(&model->trust, total > model->settled ? hx_length(common) * share : 0.0,
-                      laws->burden.overburdened, &laws->trust) == 0.0;
+                      laws->limit.overloaded, &laws->trust) == 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     laws->load[leg] += model->follow_load * (normal[leg] / model->share - laws->load[leg]);
   const double missing = squeeze_lost(plan, (const hxPlane *)deviation, laws);
@@ -276,17 +273,18 @@ static inline void update_weight(const hxForceLawsModel *model, const hxLoadPlan
                                  const double normal[HX_LEGS], double total, hxForceLaws *laws) {
   const double ratio = total / hx_larger(plan->weight, load_floor),
                scale = hx_clamp(ratio, least_scale, largest_scale);
-  if (laws->scale > weighed * laws->burden.heft && !hx_sensor_watch_contradicted(&laws->watch)) {
-    laws->sure_scale = laws->scale;
-    laws->sure_heft = laws->burden.heft;
-    laws->sure_lean = laws->lean;
+  if (laws->scale > weighed * laws->limit.weight_ratio &&
+      !hx_sensor_watch_contradicted(&laws->watch)) {
+    laws->trusted_scale = laws->scale;
+    laws->trusted_weight_ratio = laws->limit.weight_ratio;
+    laws->trusted_lean = laws->lean;
   }
   if (!marks(laws->doubted)) {
     laws->scale += model->follow_weight * (scale - laws->scale);
-    hx_burden_weigh(&model->burden, ratio, &laws->burden);
+    hx_load_limit_weigh(&model->limit, ratio, &laws->limit);
     update_lean(model, plan, normal, total, laws);
   }
-  hx_burden_step(&model->burden, plan->needed, laws->scale, &laws->burden);
+  hx_load_limit_step(&model->limit, plan->needed, laws->scale, &laws->limit);
 }
 
 /* ------------------------------------------------------------------------------------- joints */
@@ -308,7 +306,7 @@ static inline void restore_grip(const hxForceLawsModel *model, const hxLoadPlan 
 static inline void actuate(const hxForceLawsModel *model, const hxLoadPlan *plan,
                            hxForceLaws *laws) {
   const int limited = model->parts.limits;
-  const double strength = limited ? laws->burden.strength : 1.0;
+  const double strength = limited ? laws->limit.strength : 1.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       laws->torque[leg][joint] = plan->carry[leg][joint] * (strength * laws->scale);
@@ -330,7 +328,7 @@ static inline const double *hx_force_laws_raised(const hxForceLaws *laws, int *b
 static inline int hx_force_laws_meets(const hxForceLawsModel *model, int leg,
                                       const hxForceLaws *laws) {
   return model->parts.touchdown && laws->trust.level == 1.0 && laws->contact[leg] &&
-         !laws->misled[leg];
+         !laws->open_loop[leg];
 }
 
 /* Returns whether the gait clock waits for the feet of legs that end their swing (C50). waiting: it
@@ -341,7 +339,7 @@ static inline int hx_force_laws_waits(const hxForceLawsModel *model, const int l
   if (!model->parts.touchdown || laws->trust.level < 1.0) return 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const int found = waiting ? laws->carrying[leg] : laws->contact[leg];
-    waits |= landing[leg] && !found && !laws->misled[leg] &&
+    waits |= landing[leg] && !found && !laws->open_loop[leg] &&
              laws->touchdown.offset[leg] > -hx_reach_limit;
   }
   return waits;
@@ -361,7 +359,7 @@ static inline void hx_force_laws_step(const hxForceLawsModel *model, const hxLoa
   hx_landings_update(laws->contact, plan->height, plan->swinging, &laws->landings);
   if (contacts_differ(plan, laws))
     examine_contacts(model, plan, (const double (*)[3])force, reported, laws);
-  const double total = feel(model, plan, (const double (*)[3])force, normal, laws);
+  const double total = measure_loads(model, plan, (const double (*)[3])force, normal, laws);
   update_weight(model, plan, normal, total, laws);
   actuate(model, plan, laws);
 }

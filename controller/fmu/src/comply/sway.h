@@ -70,31 +70,32 @@ static inline int hx_sway_acts(const hxSway *model, double narrowing) {
   return model->active && narrowing > 0.0;
 }
 
-/* Returns the way of the torso that gives the robot another sum of m p [kg m]. laden: measured over
+/* Returns the way of the torso that gives the robot another sum of m p [kg m]. ratio: measured over
  * modelled weight [1]. */
-static inline hxPlane yield_to(const hxSway *model, hxPlane moment, double laden) {
-  return hx_plane(moment.x / (model->mass * (laden - model->forward)),
-                  moment.y / (model->mass * (laden - model->aside)));
+static inline hxPlane yield_to(const hxSway *model, hxPlane moment, double ratio) {
+  return hx_plane(moment.x / (model->mass * (ratio - model->forward)),
+                  moment.y / (model->mass * (ratio - model->aside)));
 }
 
 /* Returns nearly the whole way of the torso in the walking frame, by the shares [m]. */
-static inline hxPlane hx_sway_guess(const hxSway *model, const hxPlannedFeet *feet, double laden) {
+static inline hxPlane hx_sway_guess(const hxSway *model, const hxPlannedFeet *feet,
+                                    double weight_ratio) {
   const double mass = model->mass / HX_LEGS;
   hxPlane away = hx_scaled(model->home, -1.0);
   for (int k = 0; k < HX_LEGS; ++k) away = hx_plane_add(away, feet->plane[k]);
   away = hx_plane(model->forward * mass * away.x, model->aside * mass * away.y);
-  return hx_scaled(yield_to(model, away, laden), -1.0);
+  return hx_scaled(yield_to(model, away, weight_ratio), -1.0);
 }
 
 /* Returns the way of the torso in the walking frame [m] (C54). masses: of a torso that has moved by
  * the guess. */
 static inline hxPlane hx_sway_of(const hxSway *model, const hxInverseDynamics *dynamics,
-                                 hxPlane guess, const hxMasses *masses, double laden) {
-  hxPlane moved = hx_plane_sub(hx_scaled(guess, laden * model->mass), model->rest);
+                                 hxPlane guess, const hxMasses *masses, double weight_ratio) {
+  hxPlane moved = hx_plane_sub(hx_scaled(guess, weight_ratio * model->mass), model->rest);
   for (int k = 0; k < HX_LEGS; ++k)
     for (int link = 0; link < HX_JOINTS; ++link)
       moved = hx_plane_add(moved, hx_scaled(masses->place[k][link], dynamics->mass[k][link]));
-  return hx_plane_sub(guess, yield_to(model, moved, laden));
+  return hx_plane_sub(guess, yield_to(model, moved, weight_ratio));
 }
 
 #endif

@@ -1,4 +1,4 @@
-/* adaptation.h - squeeze and width of the stance by the load of the servos. Python:
+/* load_adaptation.h - squeeze and width of the stance by the load of the servos. Python:
  * controller/sense/load_adaptation.py. */
 #ifndef HX_LOAD_ADAPTATION_H
 #define HX_LOAD_ADAPTATION_H
@@ -17,9 +17,9 @@ typedef struct hxLoadAdaptationModel {
 typedef struct hxLoadAdaptation {
   double work[HX_LEGS][HX_JOINTS]; /* N2 m2  squares of the torques, smoothed over a gait cycle */
   double heat[HX_LEGS][HX_JOINTS]; /* N2 m2  the same, smoothed over a minute */
-  double heft;      /* 1  measured over modelled weight, smoothed over a gait cycle */
-  double narrowing; /* 1  part of the way to the narrow stance */
-  double squeeze;   /* 1  weight of the torques in the planned squeeze */
+  double weight_ratio; /* 1  measured over modelled weight, smoothed over a gait cycle */
+  double narrowing;    /* 1  part of the way to the narrow stance */
+  double squeeze;      /* 1  weight of the torques in the planned squeeze */
 } hxLoadAdaptation;
 
 static const double heat_time = 60.0; /* s  in which a small servo warms up */
@@ -53,21 +53,22 @@ static inline void hx_load_adaptation_compile(const hxControllerDefinition *defi
 static inline void hx_load_adaptation_reset(const hxLoadAdaptationModel *model,
                                             hxLoadAdaptation *adaptation) {
   memset(adaptation, 0, sizeof *adaptation);
-  adaptation->heft = 1.0;
+  adaptation->weight_ratio = 1.0;
   adaptation->squeeze = model->squeeze;
 }
 
-/* Advances weight and narrowing by one period (C53). heft: measured over modelled weight [1]. */
-static inline void hx_load_adaptation_weigh(const hxLoadAdaptationModel *model, double heft,
+/* Advances weight and narrowing by one period (C53). ratio: measured over modelled weight [1]. */
+static inline void hx_load_adaptation_weigh(const hxLoadAdaptationModel *model, double ratio,
                                             hxLoadAdaptation *adaptation) {
-  adaptation->heft += model->follow_work * (heft - adaptation->heft);
+  adaptation->weight_ratio += model->follow_work * (ratio - adaptation->weight_ratio);
   if (model->narrows)
-    adaptation->narrowing = hx_clamp((adaptation->heft - modelled) / (heavy - modelled), 0.0, 1.0);
+    adaptation->narrowing =
+        hx_clamp((adaptation->weight_ratio - modelled) / (heavy - modelled), 0.0, 1.0);
 }
 
 /* Returns measured over modelled weight, 1 in the wide stance [1] (C53). */
-static inline double hx_load_adaptation_laden(const hxLoadAdaptation *adaptation) {
-  return 1.0 + adaptation->narrowing * (adaptation->heft - 1.0);
+static inline double hx_load_adaptation_planned_weight_ratio(const hxLoadAdaptation *adaptation) {
+  return 1.0 + adaptation->narrowing * (adaptation->weight_ratio - 1.0);
 }
 
 /* Advances by one period, after hx_load_adaptation_weigh (C45). torque: feed-forward torques [N m];

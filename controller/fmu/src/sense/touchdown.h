@@ -18,10 +18,9 @@ static const double hx_early = 0.002;
 static const double hx_reach_limit = 0.040; /* m  by which a foot is lowered at most */
 static const double reach_speed = 0.08;     /* m/s  downwards */
 static const double hold_limit = 0.030;     /* m  upwards: the largest step height of the robots */
-/* s  delay after the planned touch-down that is tolerated */
-static const double grace = 0.040;
+static const double grace = 0.040; /* s  delay after the planned touch-down that is tolerated */
 /* s  of the gait clock, in which a foot that it waits for begins to move down */
-static const double patience = 0.025;
+static const double search_ramp = 0.025;
 static const double return_time = 0.060; /* s  in which an offset decays in the swing */
 static const double negligible = 1e-5;   /* m  a smaller offset is set to 0 */
 
@@ -42,8 +41,8 @@ static inline double faded(double offset, double period) {
  * clock has waited [s]. */
 static inline double moved(double offset, double late, double waited, double period, int contact,
                            double falling, int swinging) {
-  const double part = fmin(waited / patience, 1.0), eager = part * part,
-               pace = reach_speed * (late > grace ? 1.0 : eager * eager);
+  const double part = fmin(waited / search_ramp, 1.0), ramp = part * part,
+               pace = reach_speed * (late > grace ? 1.0 : ramp * ramp);
   if (waited > 0.0 || late > grace) return fmax(offset - pace * period, -hx_reach_limit);
   if (swinging && contact && falling > 0.0) return fmin(offset + falling, hold_limit);
   if (swinging && !contact) return faded(offset, period);
@@ -53,17 +52,17 @@ static inline double moved(double offset, double late, double waited, double per
 /* Advances by one period [s] (C36). contact: feet that report a force; falling: distance by which
  * the path of a foot that met the ground early moves down in this period [m], 0 for the others;
  * swinging: legs planned in the air; loaded: legs planned to carry their whole share; searching:
- * feet that the gait clock waits for; misled: feet whose sensors have just been doubted. */
+ * feet that the gait clock waits for; open_loop: feet whose sensors have just been doubted. */
 static inline void hx_touchdown_step(double period, const int contact[HX_LEGS],
                                      const double falling[HX_LEGS], const int swinging[HX_LEGS],
                                      const int loaded[HX_LEGS], const int searching[HX_LEGS],
-                                     const int misled[HX_LEGS], hxTouchdown *touchdown) {
+                                     const int open_loop[HX_LEGS], hxTouchdown *touchdown) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int misses = loaded[leg] && !contact[leg] && !misled[leg];
+    const int misses = loaded[leg] && !contact[leg] && !open_loop[leg];
     const double offset = touchdown->offset[leg];
     touchdown->late[leg] = misses ? touchdown->late[leg] + period : 0.0;
     touchdown->waited[leg] = searching[leg] ? touchdown->waited[leg] + period : 0.0;
-    touchdown->offset[leg] = misled[leg]
+    touchdown->offset[leg] = open_loop[leg]
                                  ? faded(offset, period)
                                  : moved(offset, touchdown->late[leg], touchdown->waited[leg],
                                          period, contact[leg], falling[leg], swinging[leg]);
@@ -71,11 +70,10 @@ static inline void hx_touchdown_step(double period, const int contact[HX_LEGS],
 }
 
 typedef struct hxLandings {
-  /* m  height of each foot's path above its end at the last landing; infinite before the first one
-   */
+  /* m  height of each foot's path above its end at the last landing; infinite before the first */
   double met[HX_LEGS];
   double before[HX_LEGS]; /* m  the same at the landing before; 0 until then */
-  int flew[HX_LEGS];      /* the foot has left the ground in a swing since */
+  int airborne[HX_LEGS];  /* the foot has left the ground in a swing since */
 } hxLandings;
 
 /* Returns the smallest of the other five heights; 0 when it is infinite. */
@@ -90,7 +88,7 @@ static inline void hx_landings_reset(hxLandings *landings) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     landings->met[leg] = INFINITY;
     landings->before[leg] = 0.0;
-    landings->flew[leg] = 0;
+    landings->airborne[leg] = 0;
   }
 }
 
@@ -98,11 +96,11 @@ static inline void hx_landings_reset(hxLandings *landings) {
 static inline void hx_landings_update(const int contact[HX_LEGS], const double height[HX_LEGS],
                                       const int swinging[HX_LEGS], hxLandings *landings) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    if (contact[leg] && landings->flew[leg]) {
+    if (contact[leg] && landings->airborne[leg]) {
       if (isfinite(landings->met[leg])) landings->before[leg] = landings->met[leg];
       landings->met[leg] = swinging[leg] ? fmax(height[leg], 0.0) : 0.0;
     }
-    landings->flew[leg] = (landings->flew[leg] || swinging[leg]) && !contact[leg];
+    landings->airborne[leg] = (landings->airborne[leg] || swinging[leg]) && !contact[leg];
   }
 }
 

@@ -50,21 +50,20 @@ static inline void hx_trust_compile(const hxControllerDefinition *definition, hx
   const double period = definition->period, cycle = definition->gait.period;
   model->period = period;
   model->follow_load = 1.0 - hx_decay(-period / definition->gains.support.load_time);
-  const double calm = nearbyint(calm_cycles * cycle / period);
-  model->calm = (int64_t)calm;
+  model->calm = (int64_t)nearbyint(calm_cycles * cycle / period);
 }
 
 /* Advances the trust by one period (C33) and returns the level that it goes to, 0 or 1. drag: the
- * common tangential force of the feet beyond the plan, over the normal force; overburdened: the
+ * common tangential force of the feet beyond the plan, over the normal force; overloaded: the
  * robot is far too heavy for its servos. */
-static inline double hx_trust_step(const hxTrustModel *model, double drag, int overburdened,
+static inline double hx_trust_step(const hxTrustModel *model, double drag, int overloaded,
                                    hxTrust *trust) {
   trust->slide_periods = drag > sliding_drag ? trust->slide_periods + 1 : 0;
   if ((double)trust->slide_periods * model->period > sliding_time)
     trust->recovery_periods = model->calm;
   else if (trust->recovery_periods)
     --trust->recovery_periods;
-  const double goal = trust->recovery_periods || overburdened ? 0.0 : 1.0;
+  const double goal = trust->recovery_periods || overloaded ? 0.0 : 1.0;
   if (trust->level == goal) return goal;
   trust->level += model->follow_load * (goal - trust->level);
   if (fabs(goal - trust->level) < 1.0 - trusted) trust->level = goal;

@@ -38,7 +38,7 @@ static const double trial_time = 1.0;   /* s  its period */
 static const double arrived = 1e-3;     /* rad  a command this near to the plan is the plan */
 
 /* Changes a gait to the wave of the legs that are not absent, if any is absent. */
-HX_SELDOM static void hx_gait_without(hxGait *gait, const int absent[HX_LEGS], int backwards) {
+HX_RARE void hx_gait_without(hxGait *gait, const int absent[HX_LEGS], int backwards) {
   const hxGait wave = {.pattern = HX_PATTERN_WAVE};
   double phase[HX_LEGS];
   int count = 0;
@@ -120,8 +120,7 @@ static inline hxPlane mean_of(const hxPlane place[HX_LEGS], const int out[HX_LEG
 }
 
 /* Sets the legs out of service, and the way of the torso over the others. */
-HX_SELDOM static void set_absent(const hxAbsenceModel *model, const int legs[HX_LEGS],
-                                 hxAbsence *absence) {
+HX_RARE void set_absent(const hxAbsenceModel *model, const int legs[HX_LEGS], hxAbsence *absence) {
   const hxPlane begin = hx_absence_torso(model, absence, 0),
                 goal = hx_plane_sub(mean_of(model->home, legs), mean_of(model->home, NULL));
   absence->begin = begin;
@@ -157,8 +156,7 @@ static inline int hx_absence_change(const hxAbsenceModel *model, const int lost[
 }
 
 /* Takes a leg back into service. */
-HX_SELDOM static void hx_absence_take_back(const hxAbsenceModel *model, int leg,
-                                           hxAbsence *absence) {
+HX_RARE void hx_absence_take_back(const hxAbsenceModel *model, int leg, hxAbsence *absence) {
   int legs[HX_LEGS];
   memcpy(legs, absence->legs, sizeof legs);
   legs[leg] = 0;
@@ -167,8 +165,8 @@ HX_SELDOM static void hx_absence_take_back(const hxAbsenceModel *model, int leg,
 
 /* Computes the joint angles at which a leg is out of the way [rad]. The femur is raised. The tibia
  * is folded under a limp femur, which hangs down, and raised on a locked one. */
-HX_SELDOM static void folded(const hxLegSolver *leg, const int faulty[HX_JOINTS],
-                             const int locked[HX_JOINTS], double angle[HX_JOINTS]) {
+HX_RARE void folded(const hxLegSolver *leg, const int faulty[HX_JOINTS],
+                    const int locked[HX_JOINTS], double angle[HX_JOINTS]) {
   angle[0] = leg->stance[0];
   angle[1] = leg->angle_max[1] - fold_margin;
   angle[2] = !faulty[1]  ? leg->stance[2]
@@ -179,10 +177,10 @@ HX_SELDOM static void folded(const hxLegSolver *leg, const int faulty[HX_JOINTS]
 /* Replaces the commands of a leg out of service; one without a faulty servo returns to the plan.
  * Returns whether it is there. angle: measured [rad]; swing: of the faulty joints on trial [rad].
  */
-HX_SELDOM static int fold_leg(const hxAbsenceModel *model, const hxLegSolver *leg, int k,
-                              const double angle[HX_JOINTS], const int faulty[HX_JOINTS],
-                              const int locked[HX_JOINTS], double swing, hxAbsence *absence,
-                              hxControllerOutput *output) {
+HX_RARE int fold_leg(const hxAbsenceModel *model, const hxLegSolver *leg, int k,
+                     const double angle[HX_JOINTS], const int faulty[HX_JOINTS],
+                     const int locked[HX_JOINTS], double swing, hxAbsence *absence,
+                     hxControllerOutput *output) {
   const int lost = faulty[0] || faulty[1] || faulty[2];
   const double step = fold_speed * model->period;
   double target[HX_JOINTS];

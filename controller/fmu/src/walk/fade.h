@@ -27,8 +27,7 @@ static inline void hx_fade_compile(double period, hxFadeModel *model) {
 }
 
 /* Begins a transition from the commands of the last step, continued by a period. */
-static HX_SELDOM void hx_fade_begin(const hxFadeModel *model, const hxControllerOutput *last,
-                                    hxFade *fade) {
+HX_RARE void hx_fade_begin(const hxFadeModel *model, const hxControllerOutput *last, hxFade *fade) {
   fade->left = model->steps;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
@@ -40,7 +39,7 @@ static HX_SELDOM void hx_fade_begin(const hxFadeModel *model, const hxController
 }
 
 /* Computes the distances of the commands of the control before from those of the present one. */
-HX_SELDOM static void compare(const hxControllerOutput *output, hxFade *fade) {
+HX_RARE void compare(const hxControllerOutput *output, hxFade *fade) {
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       fade->angle[leg][joint] -= output->angle_ref[leg][joint];
@@ -51,8 +50,8 @@ HX_SELDOM static void compare(const hxControllerOutput *output, hxFade *fade) {
 
 /* Adds to the commands of a step what is left of their distance from those of the control before,
  * during a transition. */
-static HX_SELDOM void hx_fade_step(const hxFadeModel *model, const hxLegSolver leg[HX_LEGS],
-                                   hxFade *fade, hxControllerOutput *output) {
+HX_RARE void hx_fade_step(const hxFadeModel *model, const hxLegSolver leg[HX_LEGS], hxFade *fade,
+                          hxControllerOutput *output) {
   if (fade->left == model->steps) compare(output, fade);
   /* the cubic of C1 from a distance and its rate to 0, and its derivatives */
   const double time = (double)model->steps * model->period,

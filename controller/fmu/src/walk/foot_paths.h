@@ -75,8 +75,8 @@ static inline void hx_foot_paths_compile(const hxControllerDefinition *definitio
 }
 
 /* Stops with the feet at `plane` and resets the gait clock. */
-HX_SELDOM static void rest(const hxFootPathsModel *model, const hxPlane plane[HX_LEGS],
-                           hxFootPaths *paths, hxPlannedFeet *feet) {
+HX_RARE void rest(const hxFootPathsModel *model, const hxPlane plane[HX_LEGS], hxFootPaths *paths,
+                  hxPlannedFeet *feet) {
   hxPlane place[HX_LEGS];
   memcpy(place, plane, sizeof place); /* plane may point into feet */
   hx_gait_clock_stop(&model->clock, &paths->clock);
@@ -240,8 +240,8 @@ static inline hxPlane ground_motion(const hxPlannedFeet *feet, int leg) {
 
 /* Returns how far the farthest foot will be from its stance position at its lift-off [m] (C55).
  * begin: phases at the begin of the walk [cycles]. */
-HX_SELDOM static double farthest(const hxFootPathsModel *model, const hxFootPaths *paths,
-                                 const hxPlannedFeet *feet, const double begin[HX_LEGS]) {
+HX_RARE double farthest(const hxFootPathsModel *model, const hxFootPaths *paths,
+                        const hxPlannedFeet *feet, const double begin[HX_LEGS]) {
   double largest = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     if (paths->clock.absent[leg]) continue;
@@ -258,8 +258,8 @@ HX_SELDOM static double farthest(const hxFootPathsModel *model, const hxFootPath
  * in the model so that one leg begins to give up its load, the first of those with which the
  * farthest foot goes least far. A leg that is back in service (-1: none) begins in the middle of
  * its swing instead (C58). */
-static HX_SELDOM void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *paths,
-                                         hxPlannedFeet *feet, int back) {
+HX_RARE void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *paths, hxPlannedFeet *feet,
+                                int returning_leg) {
   hxGaitClockModel *clock = &model->clock;
   const double unloads = hx_gait_clock_unloads(clock);
   const double *offset = clock->gait_offset;
@@ -271,12 +271,12 @@ static HX_SELDOM void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *p
   int opposite = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     opposite |= paths->clock.absent[HX_LEGS - 1 - leg] && !paths->clock.absent[leg];
-  if (back >= 0) {
+  if (returning_leg >= 0) {
     for (int leg = 0; leg < HX_LEGS; ++leg)
-      begin[leg] = 0.5 + 0.5 * clock->duty + offset[leg] - offset[back];
+      begin[leg] = 0.5 + 0.5 * clock->duty + offset[leg] - offset[returning_leg];
     hx_gait_clock_start_at(clock, begin);
   }
-  for (int first = 0; back < 0 && first < HX_LEGS; ++first) {
+  for (int first = 0; returning_leg < 0 && first < HX_LEGS; ++first) {
     const int *absent = paths->clock.absent;
     if (absent[first] || (opposite && !absent[HX_LEGS - 1 - first])) continue;
     for (int leg = 0; leg < HX_LEGS; ++leg) begin[leg] = unloads + (offset[leg] - offset[first]);
@@ -285,7 +285,7 @@ static HX_SELDOM void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *p
     least = far;
     hx_gait_clock_start_at(clock, begin);
   }
-  hx_gait_clock_start_standing(clock, back, &paths->clock);
+  hx_gait_clock_start_standing(clock, returning_leg, &paths->clock);
   memset(paths->met, 0, sizeof paths->met);
 }
 

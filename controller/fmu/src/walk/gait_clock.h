@@ -40,7 +40,7 @@ typedef struct hxGaitClock {
 static const double clock_epsilon = 1e-9;
 
 /* Sets the phases of the legs at the begin of the walk [cycles]. */
-HX_SELDOM static void hx_gait_clock_start_at(hxGaitClockModel *model, const double begin[HX_LEGS]) {
+HX_RARE void hx_gait_clock_start_at(hxGaitClockModel *model, const double begin[HX_LEGS]) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double first = begin[leg] + clock_epsilon, phase = hx_fraction(first);
     model->offset[leg] = begin[leg] - clock_epsilon;
@@ -105,15 +105,15 @@ static inline double hx_gait_clock_unloads(const hxGaitClockModel *model) {
 }
 
 /* Begins the walk anew with legs that all stand (C55), but for one that swings (C58); -1: none. */
-HX_SELDOM static void hx_gait_clock_start_standing(const hxGaitClockModel *model, int back,
-                                                   hxGaitClock *clock) {
+HX_RARE void hx_gait_clock_start_standing(const hxGaitClockModel *model, int returning_leg,
+                                          hxGaitClock *clock) {
   hx_gait_clock_stop(model, clock);
   clock->walking = 1;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     clock->standing[leg] = hx_gait_clock_serves(model, clock, leg, 0);
-  if (back < 0) return;
-  clock->swinging[back] = 1;
-  clock->stayed[back] = 0;
+  if (returning_leg < 0) return;
+  clock->swinging[returning_leg] = 1;
+  clock->stayed[returning_leg] = 0;
 }
 
 /* ----------------------------------------------------------------------------------- sections */
@@ -143,8 +143,8 @@ static inline int hx_gait_clock_drops(const hxGaitClock *clock) {
 
 /* Lets the legs skip their next steps that have not begun to give up their loads (C55). kept: legs
  * that were to skip them already. */
-HX_SELDOM static void hx_gait_clock_keep_down(const hxGaitClockModel *model,
-                                              const int kept[HX_LEGS], hxGaitClock *clock) {
+HX_RARE void hx_gait_clock_keep_down(const hxGaitClockModel *model, const int kept[HX_LEGS],
+                                     hxGaitClock *clock) {
   const int dropped = hx_gait_clock_drops(clock);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double phase = hx_gait_clock_phase(model, leg, clock->before);

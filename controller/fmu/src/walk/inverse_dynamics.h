@@ -149,7 +149,7 @@ static inline void add_force(hxPlane push, double lift, hxPlane place, double he
 
 /* Adds the forces that the torso needs to the demand (C16, C56). */
 static inline void demand_torso(const hxInverseDynamics *model, const hxNeighbours *motion,
-                                double laden, hxDemand *demand) {
+                                double ratio, hxDemand *demand) {
   const hxMasses *now = motion->masses[1], *before = motion->masses[0], *after = motion->masses[2];
   hxPlane a = {0.0, 0.0}, spin = {0.0, 0.0};
   double up = 0.0;
@@ -159,7 +159,7 @@ static inline void demand_torso(const hxInverseDynamics *model, const hxNeighbou
     up = acceleration(before->torso_height, now->torso_height, after->torso_height, model->period);
     spin = plane_acceleration(before->R_WK, now->R_WK, after->R_WK, model->period);
   }
-  const double pushed = (model->torso_mass + (laden - 1.0) * model->total_mass) / laden;
+  const double pushed = (model->torso_mass + (ratio - 1.0) * model->total_mass) / ratio;
   const hxPlane push = hx_times(hx_scaled(a, pushed), hx_conj(now->R_WK));
   add_force(push, model->torso_mass * (up + model->gravity), now->torso_place, now->torso_height,
             model->floor, demand);
@@ -169,7 +169,7 @@ static inline void demand_torso(const hxInverseDynamics *model, const hxNeighbou
 /* Adds m (a + g) of the links of a leg to the demand (C16, C56), and returns it in the torso
  * frame. */
 static inline void demand_links(const hxInverseDynamics *model, const hxNeighbours *motion, int leg,
-                                const hxPosture *posture, double laden, hxPlane push[HX_JOINTS],
+                                const hxPosture *posture, double ratio, hxPlane push[HX_JOINTS],
                                 double lift[HX_JOINTS], hxDemand *demand) {
   const hxMasses *now = motion->masses[1], *before = motion->masses[0], *after = motion->masses[2];
   for (int link = 0; link < HX_JOINTS; ++link) {
@@ -184,7 +184,7 @@ static inline void demand_links(const hxInverseDynamics *model, const hxNeighbou
     }
     push[link] = hx_times(hx_scaled(a, mass), hx_conj(now->R_WK));
     lift[link] = mass * (up + model->gravity);
-    add_force(hx_scaled(push[link], 1.0 / laden), lift[link], now->place[leg][link],
+    add_force(hx_scaled(push[link], 1.0 / ratio), lift[link], now->place[leg][link],
               now->height[leg][link], model->floor, demand);
     hx_posture_turn_back(posture, &push[link], &lift[link]);
   }
@@ -240,12 +240,12 @@ static inline void lever_of(const hxLegSolver *leg, const hxPose *pose, const hx
   }
 }
 
-/* laden: measured over modelled weight [1]. The planned loads are scaled by it (C30), but a payload
- * needs no push for the legs, and more for the torso (C56). */
+/* weight_ratio: measured over modelled weight [1]. The planned loads are scaled by it (C30), but a
+ * payload needs no push for the legs, and more for the torso (C56). */
 static inline void
 hx_inverse_dynamics_demand(const hxInverseDynamics *model, const hxLegSolver leg[HX_LEGS],
                            const hxNeighbours *motion, const double speed[HX_LEGS][HX_JOINTS],
-                           const hxPosture *posture, double laden, hxDemand *demand) {
+                           const hxPosture *posture, double weight_ratio, hxDemand *demand) {
   hxPlane push[HX_JOINTS];
   double lift[HX_JOINTS];
   double rubs[HX_LEGS * HX_JOINTS];
@@ -254,12 +254,12 @@ hx_inverse_dynamics_demand(const hxInverseDynamics *model, const hxLegSolver leg
     rubs[i] = speed[i / HX_JOINTS][i % HX_JOINTS] / gear_speed;
   hx_saturations(HX_LEGS * HX_JOINTS, rubs, rubs);
   for (int k = 0; k < HX_LEGS; ++k) {
-    demand_links(model, motion, k, posture, laden, push, lift, demand);
+    demand_links(model, motion, k, posture, weight_ratio, push, lift, demand);
     demand_torques(model, &leg[k], motion, k, push, lift, &rubs[k * HX_JOINTS], speed[k],
                    demand->torque[k]);
     lever_of(&leg[k], &motion->pose[1][k], posture, demand->lever[k]);
   }
-  demand_torso(model, motion, laden, demand);
+  demand_torso(model, motion, weight_ratio, demand);
 }
 
 #endif

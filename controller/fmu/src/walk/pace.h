@@ -109,9 +109,9 @@ static inline double needed_of(const hxPaceModel *model, const hxStride *stride,
 }
 
 /* Computes the command with the share of its velocity that the joints can follow (C59). */
-HX_SELDOM static void hx_pace_follow(const hxPaceModel *model, hxStride *stride,
-                                     const double asked[HX_COMMANDS], hxPace *pace,
-                                     double target[HX_COMMANDS]) {
+HX_RARE void hx_pace_follow(const hxPaceModel *model, hxStride *stride,
+                            const double asked[HX_COMMANDS], hxPace *pace,
+                            double target[HX_COMMANDS]) {
   const double still[3] = {0.0, 0.0, 0.0};
   double most = fastest, low = 0.0, high = 1.0;
   int above[HX_LEGS];

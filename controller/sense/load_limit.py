@@ -1,4 +1,4 @@
-"""Limits the support to the weight that the servos can carry. C: burden.h.
+"""Limits the support to the weight that the servos can carry. C: load_limit.h.
 
 Legs that squeeze each other support the torso like an arch: kinematic control needs only 0.6 of the
 torque of the planned shares, which contain no squeeze. If a robot is too heavy for its servos
@@ -20,17 +20,17 @@ SUPPORT_HELPS, SUPPORT_FAILS = 1.35, 1.5  # 1    torque needed over torque allow
 LIGHTEST, HEAVIEST = 0.5, 4.0  # 1    limits of measured over modelled weight
 
 
-class Burden(Stateful):
+class LoadLimit(Stateful):
     """Ratio of the robot's weight to the capacity of its servos.
 
     Attributes:
-        heft: measured over modelled weight, smoothed [1].
+        weight_ratio: measured over modelled weight, smoothed [1].
         peak: recent peak of the torque that a joint needs for the modelled weight [N m].
         strength: factor on the planned support [1].
-        overburdened: the robot is far too heavy for its servos.
+        overloaded: the robot is far too heavy for its servos.
     """
 
-    STATE = ("heft", "peak", "strength", "overburdened")
+    STATE = ("weight_ratio", "peak", "strength", "overloaded")
 
     def __init__(self, *, most: float, cycle: float, period: float, weight_time: float) -> None:
         """Computes the filter coefficients and resets the state.
@@ -44,12 +44,12 @@ class Burden(Stateful):
 
     def reset(self) -> None:
         """Sets the weight to the modelled one, with full support."""
-        self.heft, self.peak, self.strength = 1.0, 0.0, 1.0
-        self.overburdened = False
+        self.weight_ratio, self.peak, self.strength = 1.0, 0.0, 1.0
+        self.overloaded = False
 
     def weigh(self, ratio: float) -> None:
         """Filters the ratio of measured to modelled weight of this period (C32)."""
-        self.heft += self.follow * (min(max(ratio, LIGHTEST), HEAVIEST) - self.heft)
+        self.weight_ratio += self.follow * (min(max(ratio, LIGHTEST), HEAVIEST) - self.weight_ratio)
 
     def step(self, needed: float, scale: float) -> None:
         """Advances the strength by one period (C31, C32).
@@ -58,8 +58,8 @@ class Burden(Stateful):
         over modelled weight, by which the support is scaled [1].
         """
         self.peak = max(needed, self.fade * self.peak)
-        limit = SUPPORT_HELPS if self.overburdened else SUPPORT_FAILS
-        self.overburdened = self.heft * self.peak > self.most * limit
+        limit = SUPPORT_HELPS if self.overloaded else SUPPORT_FAILS
+        self.overloaded = self.weight_ratio * self.peak > self.most * limit
         allowed = self.most / max(scale * self.peak, self.most)
         part = FULL_SUPPORT * (allowed - NO_SUPPORT) / (FULL_SUPPORT - NO_SUPPORT)
         self.strength = min(allowed, max(part, 0.0))

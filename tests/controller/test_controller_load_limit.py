@@ -13,22 +13,22 @@ import pytest
 from gains import PERIOD
 from standing import GAINS, make_laws, plan, shared
 
-from hexapod_cosim.controller.sense.burden import Burden
+from hexapod_cosim.controller.sense.load_limit import LoadLimit
 
 MOST, CYCLE = 5.0, 1.0  # N m, s
 WEIGHT_TIME = 0.5  # s; a fifth of it smooths the measured weight
 
 
-def make() -> Burden:
-    return Burden(most=MOST, cycle=CYCLE, period=PERIOD, weight_time=WEIGHT_TIME)
+def make() -> LoadLimit:
+    return LoadLimit(most=MOST, cycle=CYCLE, period=PERIOD, weight_time=WEIGHT_TIME)
 
 
-def of_weight(ratio: float) -> Burden:
-    """Returns a burden that has converged to a measured weight, given over the modelled weight."""
-    burden = make()
+def of_weight(ratio: float) -> LoadLimit:
+    """Returns a limit that has converged to a measured weight, given over the modelled one."""
+    load_limit = make()
     for _ in range(4000):
-        burden.weigh(ratio)
-    return burden
+        load_limit.weigh(ratio)
+    return load_limit
 
 
 @pytest.mark.parametrize(
@@ -49,37 +49,37 @@ def test_no_servo_is_asked_for_more_than_it_may_and_for_less_where_the_arch_has_
     """The support has all of the allowed torque down to 84 % of the needed torque, and none below
     54 %.
     """
-    burden = make()
-    burden.step(needed, scale)
-    assert burden.strength == pytest.approx(strength, abs=1e-9)
-    assert burden.strength * scale * needed <= MOST * (1.0 + 1e-12)
+    load_limit = make()
+    load_limit.step(needed, scale)
+    assert load_limit.strength == pytest.approx(strength, abs=1e-9)
+    assert load_limit.strength * scale * needed <= MOST * (1.0 + 1e-12)
 
 
 def test_far_too_heavy_is_half_more_than_servos_carry_and_stays_so_down_to_a_third() -> None:
-    burden, found = of_weight(1.0), []
+    load_limit, found = of_weight(1.0), []
     for needed in (7.4, 7.6, 6.8, 6.7, 7.4, 7.6):
-        burden.peak = 0.0  # without the peak of the steps before
-        burden.step(needed, 1.0)
-        found.append(burden.overburdened)
+        load_limit.peak = 0.0  # without the peak of the steps before
+        load_limit.step(needed, 1.0)
+        found.append(load_limit.overloaded)
     assert found == [False, True, True, False, False, True]
 
 
 def test_the_measured_weight_is_smoothed_and_believed_between_half_and_four_times() -> None:
-    burden = make()
+    load_limit = make()
     for k in range(1, 200):
-        burden.weigh(2.0)
-        assert burden.heft == pytest.approx(2.0 - math.exp(-k * PERIOD / 0.1))
-    assert of_weight(0.0).heft == pytest.approx(0.5)
-    assert of_weight(1e9).heft == pytest.approx(4.0)
+        load_limit.weigh(2.0)
+        assert load_limit.weight_ratio == pytest.approx(2.0 - math.exp(-k * PERIOD / 0.1))
+    assert of_weight(0.0).weight_ratio == pytest.approx(0.5)
+    assert of_weight(1e9).weight_ratio == pytest.approx(4.0)
 
 
 def test_the_largest_torque_of_late_fades_by_e_in_a_gait_cycle() -> None:
-    burden = make()
-    burden.step(10.0, 1.0)
+    load_limit = make()
+    load_limit.step(10.0, 1.0)
     for _ in range(round(CYCLE / PERIOD)):
-        burden.step(0.0, 1.0)
-    assert burden.strength == 1.0
-    assert burden.peak == pytest.approx(10.0 * math.exp(-1.0))
+        load_limit.step(0.0, 1.0)
+    assert load_limit.strength == 1.0
+    assert load_limit.peak == pytest.approx(10.0 * math.exp(-1.0))
 
 
 def carried() -> np.ndarray:
