@@ -295,7 +295,7 @@ def test_a_first_step_at_no_time_and_a_state_of_nothing_are_refused() -> None:
     controller = make()
     with pytest.raises(ControllerError, match=r"got nan, expected a finite time \[s\]"):
         controller.step(float("nan"), BodyCommand(), Measurement())
-    with pytest.raises(ControllerError, match="not a controller's state: got 'no .*gait"):
+    with pytest.raises(ControllerError, match=r"not a controller's state: got 'no .*gait"):
         controller.restore({})
 
 
