@@ -170,19 +170,19 @@ def stop_energy(servo: Servo, past: Array) -> Array:
     return np.asarray(0.5 * servo.stop_stiffness * past**2 * has_stops(servo))
 
 
-def lock_joints(robot: Robot, held: Array) -> Robot:
+def lock_joints(robot: Robot, locked_angle: Array) -> Robot:
     """Returns the robot with joints locked at angles (6, 3) [rad], NaN for free ones.
 
     A locked joint has stops at its angle, of arrays (6, 3) of stiffness and damping: it yields
     1 mrad under its motor's largest torque.
     """
-    servo, locked = robot.servo, ~np.isnan(held)
+    servo, locked = robot.servo, ~np.isnan(locked_angle)
     most = stall_torque(servo) if servo.drive == "motor" else servo.torque_max
     stiffness = np.where(locked, most / LOCK_YIELD, servo.stop_stiffness)
     damping = np.where(locked, LOCK_TIME * most / LOCK_YIELD, servo.stop_damping)
     stops: dict[str, Any] = {"stop_stiffness": stiffness, "stop_damping": damping}
     legs = []
-    for leg, angles in zip(robot.legs, held.tolist(), strict=True):
+    for leg, angles in zip(robot.legs, locked_angle.tolist(), strict=True):
         coxa, femur, tibia = (
             link if math.isnan(angle) else replace(link, angle_min=angle, angle_max=angle)
             for link, angle in zip(leg.links, angles, strict=True)

@@ -60,9 +60,9 @@ def masses(robot: Robot) -> Array:
 def world_inertias(robot: Robot, body: Array) -> Array:
     """Returns the inertias J = R_WB J_B R_WB^T (19, 3, 3), world axes [kg m2]."""
     local = [robot.torso.inertia, *(link.inertia for leg in robot.legs for link in leg.links)]
-    turns = [rotation_matrix(state[3:7]) for state in body]
+    R = [rotation_matrix(state[3:7]) for state in body]
     return np.array(
-        [R_WB @ inertia_matrix(J_B) @ R_WB.T for R_WB, J_B in zip(turns, local, strict=True)]
+        [R_WB @ inertia_matrix(J_B) @ R_WB.T for R_WB, J_B in zip(R, local, strict=True)]
     )
 
 
@@ -78,11 +78,11 @@ def mass_matrix(robot: Robot, body: Array, joints: Constraints | None = None) ->
         M[6 * k : 6 * k + 3, 6 * k : 6 * k + 3] = mass * np.eye(3)
         M[6 * k + 3 : 6 * k + 6, 6 * k + 3 : 6 * k + 6] = J
     G = (joints or constraints(robot, body)).G
-    P, spin = carried_turns(robot, G), spin_inertia(robot.servo)
+    P, spin = carrier_speeds(robot, G), spin_inertia(robot.servo)
     return M + robot.servo.rotor_inertia * G.T @ G + spin * (G.T @ P + P.T @ G)
 
 
-def carried_turns(robot: Robot, G: Array) -> Array:
+def carrier_speeds(robot: Robot, G: Array) -> Array:
     """Returns P (18, 114): P v are the speeds s.w_i at which the bodies that carry the rotors turn
     about the joints' axes.
 
@@ -179,10 +179,10 @@ def external_torques(
     c = joints.gamma - 2.0 * alpha * joints.dphi - beta**2 * joints.phi
     torso = np.eye(6, 6 * BODIES)
     fixed = np.vstack([torso, joints.D, joints.G])
-    none, turns = np.zeros((6 + len(c), LEGS * JOINTS)), np.eye(LEGS * JOINTS)
-    motion = np.linalg.solve(fixed, np.vstack([none, turns]))  # of the links with each joint
+    none, unit = np.zeros((6 + len(c), LEGS * JOINTS)), np.eye(LEGS * JOINTS)
+    motion = np.linalg.solve(fixed, np.vstack([none, unit]))  # of the links with each joint
     kinematic = robot.servo.mode == "kinematic"
-    driven = drive_acceleration(robot, body, command).ravel() if kinematic else turns[0] * 0.0
+    driven = drive_acceleration(robot, body, command).ravel() if kinematic else unit[0] * 0.0
     bias = np.linalg.solve(fixed, np.concatenate([np.zeros(6), c, driven]))
     links = replace(robot, servo=replace(robot.servo, rotor_inertia=0.0))
     load = motion.T @ (forces - mass_matrix(links, body, joints) @ bias)

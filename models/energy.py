@@ -19,7 +19,7 @@ from hexapod_cosim.models.contact.forces import (
     shares_of_feet,
 )
 from hexapod_cosim.models.dynamics import (
-    carried_turns,
+    carrier_speeds,
     joint_overruns,
     mass_matrix,
     masses,
@@ -45,8 +45,8 @@ def spin_energy(robot: Robot, body: Array) -> float:
     """Returns the part of the kinetic energy by which rotors turn with the bodies (19, 13) that
     carry them, the sum of h s.w_i [J] (eq. 54).
     """
-    turns = carried_turns(robot, constraints(robot, body).G) @ body[:, 7:13].ravel()
-    return spin_inertia(robot.servo) * float(joint_speeds(robot, body).ravel() @ turns)
+    speeds = carrier_speeds(robot, constraints(robot, body).G) @ body[:, 7:13].ravel()
+    return spin_inertia(robot.servo) * float(joint_speeds(robot, body).ravel() @ speeds)
 
 
 def kinetic_energy(robot: Robot, body: Array) -> float:

@@ -126,9 +126,9 @@ def step_works(
     feet = [foot_contacts(robot, body) for body in (before, after)]
     for leg in np.flatnonzero(closed):
         losses = contact_works(robot, feet[0][leg], feet[1][leg], impulses.foot[leg])
-        turn = (before + after)[JOINTS * (leg + 1), 10:13]
+        twice_w = (before + after)[JOINTS * (leg + 1), 10:13]
         contact += losses[0]
-        friction += losses[1] - float(impulses.moment[leg] @ turn) / 2.0
+        friction += losses[1] - float(impulses.moment[leg] @ twice_w) / 2.0
     gear = -float(np.sum((impulses.gear + impulses.stop) * speed))
     stored = [stop_energy(robot.servo, joint_overruns(robot, body)) for body in (before, after)]
     gear -= float(np.sum(stored[1] - stored[0]))

@@ -97,12 +97,12 @@ def keep_slopes(
     stops = stop_slopes(robot.servo, joint_overruns(robot, body), speed)
     found = {}
     for k, point, state, contact in closed_contacts(robot, body, contacts):
-        turn = body[point.sphere.body, 10:13]
+        w = body[point.sphere.body, 10:13]
         if state.is_soft:
             found[k] = soil_slopes(robot, state, float(contacts.plastic[k]), contact, ahead)
         else:
             deflection = bristle[point.leg] if point.is_sole else np.zeros(3)
-            found[k] = rigid_slopes(robot, point, state, contact, deflection, turn, ahead)
+            found[k] = rigid_slopes(robot, point, state, contact, deflection, w, ahead)
     drag = gear_drag(robot.servo, speed)
     if has_measured_friction(robot.servo):
         forces = applied_forces(robot, body, command, contacts, bristle).ravel()
@@ -128,12 +128,12 @@ def rigid_slopes(
     state: ContactState,
     contact: FootContact,
     bristle: Array,
-    turn: Array,
+    w: Array,
     ahead: float,
 ) -> ContactSlopes:
     """Returns the derivatives of a contact with rigid ground.
 
-    bristle: deflection (3,) of a sole [m]; turn: angular velocity (3,) of the body [rad/s].
+    bristle: deflection (3,) of a sole [m]; w: angular velocity (3,) of the body [rad/s].
     """
     at = (state.contact, state.damping, expected_depth(contact, ahead), contact.approach_speed)
     f_n, (stiffness, viscosity) = normal_force(*at), normal_slopes(*at)
@@ -147,7 +147,7 @@ def rigid_slopes(
         slopes = ContactSlopes(stiffness, viscosity, drag, spring, b.relaxation)
     if point.leg < 0:
         return slopes
-    spin, roll = turning_slopes(friction, robot.foot.radius, contact.normal, turn)
+    spin, roll = turning_slopes(friction, robot.foot.radius, contact.normal, w)
     return replace(slopes, spin=f_n * spin, roll=f_n * roll)
 
 
@@ -188,8 +188,8 @@ def slope_matrices(
         G_x += by_x
         G_v += by_v
         nn = np.outer(contact.normal, contact.normal)
-        turn = slice(6 * point.sphere.body + 3, 6 * point.sphere.body + 6)
-        G_v[turn, turn] -= law.spin * nn + law.roll * (np.eye(3) - nn)
+        angular = slice(6 * point.sphere.body + 3, 6 * point.sphere.body + 6)
+        G_v[angular, angular] -= law.spin * nn + law.roll * (np.eye(3) - nn)
     return G_x, G_v
 
 

@@ -126,7 +126,7 @@ def _values_at(recording: Recording, names: Sequence[str], t: float) -> Array:
 def time_shares(time: Array) -> Array:
     """Returns the weights of the trapezoidal rule (rows,), as shares of the whole time."""
     steps = np.diff(time)
-    weights = 0.5 * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
+    weights = np.append(steps, 0.0) + np.insert(steps, 0, 0.0)
     return np.asarray(weights / weights.sum())
 
 

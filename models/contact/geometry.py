@@ -84,41 +84,41 @@ def foot_force(
     return f_n * foot.normal + friction
 
 
-def foot_moment(robot: Robot, foot: FootContact, damping: float, turn: Array) -> Array:
+def foot_moment(robot: Robot, foot: FootContact, damping: float, w: Array) -> Array:
     """Returns the moment (3,) of spin and rolling friction on the tibia [N m] (eq. 38).
 
-    turn: angular velocity (3,) of the tibia [rad/s].
+    w: angular velocity (3,) of the tibia [rad/s].
     """
     f_n = normal_force(robot.contact, damping, foot.penetration, foot.approach_speed)
-    return turning_moment(robot.friction, robot.foot.radius, f_n, foot.normal, turn)
+    return turning_moment(robot.friction, robot.foot.radius, f_n, foot.normal, w)
 
 
 def turning_slopes(
-    friction: Friction, radius: float, normal: Array, turn: Array
+    friction: Friction, radius: float, normal: Array, w: Array
 ) -> tuple[float, float]:
     """Returns the moments of spin and rolling friction over load and angular speed [m s] (eq. 38).
 
     radius: that of the sphere [m]; its speeds R |w_n| and R |w_t| regularise the moments.
-    normal: (3,) of the ground; turn: angular velocity (3,) [rad/s].
+    normal: (3,) of the ground; w: angular velocity (3,) [rad/s].
     """
-    spin = float(normal @ turn)
+    spin = float(normal @ w)
     slow = radius * abs(spin)
-    fast = radius * float(np.linalg.norm(turn - spin * normal))
+    fast = radius * float(np.linalg.norm(w - spin * normal))
     about = float(stribeck_curve(friction, slow)) * friction_direction(friction, slow)
     across = friction_direction(friction, fast)
     return friction.spin_radius * radius * about, friction.rolling_radius * radius * across
 
 
 def turning_moment(
-    friction: Friction, radius: float, load: float, normal: Array, turn: Array
+    friction: Friction, radius: float, load: float, normal: Array, w: Array
 ) -> Array:
     """Returns the moment (3,) [N m] of spin and rolling friction at a load [N] (eq. 38).
 
     The other arguments are those of `turning_slopes`.
     """
-    spin, roll = turning_slopes(friction, radius, normal, turn)
-    about = float(normal @ turn) * normal
-    return -load * (spin * about + roll * (turn - about))
+    spin, roll = turning_slopes(friction, radius, normal, w)
+    about = float(normal @ w) * normal
+    return -load * (spin * about + roll * (w - about))
 
 
 def slip_velocity(contact: FootContact) -> Array:

@@ -150,13 +150,13 @@ static void fill_contact_slots(hxContactState *contact, int row) {
 /* Holds the cells of feet that touch the ground and releases those of others. */
 static void hold_cells(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    int touches = 0;
-    for (int row = HX_FOOT; hx_is_of_foot(row); ++row) touches |= contact->closed[row][leg] != 0.0;
+    int in_contact = 0;
+    for (int k = HX_FOOT; hx_is_of_foot(k); ++k) in_contact |= contact->closed[k][leg] != 0.0;
     double centre[3];
     centre_of(depths, HX_FOOT, leg, centre);
     double cell[2] = {contact->cell[0][leg], contact->cell[1][leg]};
-    if (touches && cell[0] < 0.0) hx_terrain_cell_at(model->terrain, centre, cell);
-    for (int i = 0; i < 2; ++i) contact->cell[i][leg] = touches ? cell[i] : -1.0;
+    if (in_contact && cell[0] < 0.0) hx_terrain_cell_at(model->terrain, centre, cell);
+    for (int i = 0; i < 2; ++i) contact->cell[i][leg] = in_contact ? cell[i] : -1.0;
   }
   for (int i = 0; i < 2; ++i) hx_fill_slots(contact->cell[i]);
 }

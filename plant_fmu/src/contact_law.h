@@ -55,7 +55,7 @@ int hx_contact_is_due(const hxModel *model, const hxDepths *depths, const hxCont
 int hx_contact_switch(const hxModel *model, const hxDepths *depths, hxContactState *contact);
 
 /* Gives feet's contacts with blocks that have just closed the damping and the impact speed of one
- * that was closed before and carries the same spot, so that low steps cause no impacts. */
+ * that was closed before and carries the same part of the foot: low steps cause no impacts. */
 void hx_contact_continue_impacts(const hxModel *model, const hxMoment *at,
                                  const hxContactState *before, hxContactState *contact);
 

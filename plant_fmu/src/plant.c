@@ -116,7 +116,7 @@ size_t hx_plant_footprints(const hxPlant *plant, hxFootprint *footprint, size_t 
   const hxFootprints *kept = &plant->footprints.kept;
   const size_t number = (size_t)hx_footprints_number(kept), first = (size_t)kept->count - number;
   for (size_t k = 0; k < number && k < capacity; ++k)
-    footprint[k] = kept->print[(first + k) % HX_FOOTPRINTS];
+    footprint[k] = kept->footprint[(first + k) % HX_FOOTPRINTS];
   return number;
 }
 

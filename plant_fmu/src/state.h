@@ -223,7 +223,7 @@ typedef struct hxContactState {
                               *    above which one is; 0 on rigid ground */
   double place[2][HX_SLOTS]; /* m  x and y where they left the bottom of that footprint */
   /* contact_law.c: at touch-down, and where a foot leaves its cell */
-  double cell[2][HX_SLOTS]; /* 1  blocks: column and row over which a foot is; < 0: not held */
+  double cell[2][HX_SLOTS]; /* 1  blocks: column and row over which a foot is; < 0: none */
   /* kernels/integrator.h: at the end of every step */
   double nearest[2][HX_SLOTS]; /* m  smooth grids: x and y from a foot's centre to the point nearest
                                 *    to it, where the next search begins; 0 between calls */
@@ -251,7 +251,7 @@ typedef struct hxContactMoment {
 typedef struct hxMoment {
   double angle[HX_JOINTS][HX_SLOTS];    /* rad */
   double speed[HX_JOINTS][HX_SLOTS];    /* rad/s */
-  double turn[3][HX_SLOTS];             /* rad/s  of the tibias, world axes */
+  double w[3][HX_SLOTS];                /* rad/s  of the tibias, world axes */
   double time;                          /* s */
   double stale;                         /* 1      1: coordinates were set since */
   hxContactMoment contact[HX_ROWS];     /* the model's rows are set */
@@ -304,7 +304,7 @@ typedef struct hxMeasured {
 enum { HX_MEASURED_LINES = offsetof(hxMeasured, contact_loss) / (HX_SLOTS * sizeof(double)) };
 
 /* State of a plant. A call of hx_plant_step writes in this order
- *   locked, held                      plant/locks.c
+ *   locked, locked_angle                plant/locks.c
  *   in each part of the call, from one transmission of the bus to the next:
  *     bus, firmware                   command/command.c: hx_bus_send, hx_follow_goals
  *     supply, duty                    command/command.c: hx_supply_power
@@ -327,8 +327,8 @@ typedef struct hxState {
   double call_evaluations;          /* 1  evaluations before the last call began */
   double supply;                    /* 1  hxCommand.supply of the last call, */
   double duty[HX_JOINTS][HX_SLOTS]; /* 1    and its duty */
-  double locked[HX_JOINTS][HX_SLOTS]; /* 1    1: the joint is locked */
-  double held[HX_JOINTS][HX_SLOTS];   /* rad  where it was locked */
+  double locked[HX_JOINTS][HX_SLOTS];       /* 1    1: the joint is locked */
+  double locked_angle[HX_JOINTS][HX_SLOTS]; /* rad  where it was locked */
   hxBus bus;
   hxFirmware firmware;
   hxPlantMotion motion;

@@ -12,10 +12,11 @@ from walks import PARAMETERS, PERIOD, ROBOT, SyntheticRun
 
 from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.master.loop import COMPLETED
+from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.report.headline import headline
 from hexapod_cosim.cosim.report.tables import comparison_rows
 from hexapod_cosim.cosim.results.comparison import compare_runs
-from hexapod_cosim.cosim.results.locomotion import describe_fall, missed_end
+from hexapod_cosim.cosim.results.locomotion import describe_fall, found_faults, missed_end
 from hexapod_cosim.cosim.results.metric_table import METRICS
 from hexapod_cosim.cosim.results.side_by_side import compare_all, read_seeds, write_seeds
 from hexapod_cosim.cosim.results.summary import Summary
@@ -254,3 +255,17 @@ def test_seeds_csv_keeps_who_arrived(tmp_path: Path) -> None:
     runs = [run("kinematic", 0), run("mine", 0, missed=STUCK)]
     write_seeds(tmp_path / "seeds.csv", runs)
     assert read_seeds(tmp_path / "seeds.csv") == {"kinematic": [runs[0]], "mine": [runs[1]]}
+
+
+def test_what_the_controller_found_is_told_in_order_with_times_from_the_first_row() -> None:
+    names = ("time", "controller.LF.absent", "controller.RM.outrun")
+    rows = [[7.0, 0.0, 1.0], [7.5, 1.0, 1.0], [8.0, 1.0, 0.0], [8.5, 0.0, 0.0]]
+    assert found_faults(Recording(names, np.array(rows))) == [
+        {
+            "time": 0.0,
+            "text": "the command is too fast for the joints of RM: the body walks slower",
+        },
+        {"time": 0.5, "text": "the controller walks without LF"},
+        {"time": 1.0, "text": "the command is no longer too fast for the joints of RM"},
+        {"time": 1.5, "text": "the controller walks with LF again"},
+    ]

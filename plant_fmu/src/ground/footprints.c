@@ -17,7 +17,7 @@ int hx_footprints_number(const hxFootprints *footprints) { return number_of(foot
 
 void hx_footprints_clear(hxFootprintLog *log) {
   const size_t used = (size_t)hx_footprints_number(&log->kept);
-  memset(log->kept.print, 0, used * sizeof(hxFootprint));
+  memset(log->kept.footprint, 0, used * sizeof(hxFootprint));
   log->kept.count = log->call_start = 0.0;
 }
 
@@ -28,15 +28,15 @@ void hx_footprints_take_back(hxFootprintLog *log) {
   const double made = kept->count - log->call_start;
   const double changed = made < HX_FOOTPRINTS ? made : HX_FOOTPRINTS;
   for (double k = 0.0; k < changed; k += 1.0)
-    kept->print[entry(log->call_start + k)] = log->lost[entry(log->call_start + k)];
+    kept->footprint[entry(log->call_start + k)] = log->lost[entry(log->call_start + k)];
   kept->count = log->call_start;
 }
 
-void hx_footprints_add(hxFootprintLog *log, const hxFootprint *print) {
+void hx_footprints_add(hxFootprintLog *log, const hxFootprint *footprint) {
   hxFootprints *kept = &log->kept;
   const int k = entry(kept->count);
-  if (kept->count - log->call_start < HX_FOOTPRINTS) log->lost[k] = kept->print[k];
-  kept->print[k] = *print;
+  if (kept->count - log->call_start < HX_FOOTPRINTS) log->lost[k] = kept->footprint[k];
+  kept->footprint[k] = *footprint;
   kept->count += 1.0;
 }
 
@@ -44,10 +44,10 @@ double hx_footprints_depth(const hxFootprints *footprints, double x, double y) {
   const int number = hx_footprints_number(footprints);
   double depth = 0.0;
   for (int k = 0; k < number; ++k) {
-    const hxFootprint *print = &footprints->print[k];
-    const double dx = x - print->x, dy = y - print->y;
-    if (dx * dx + dy * dy <= print->radius * print->radius && print->depth > depth)
-      depth = print->depth;
+    const hxFootprint *footprint = &footprints->footprint[k];
+    const double dx = x - footprint->x, dy = y - footprint->y;
+    if (dx * dx + dy * dy <= footprint->radius * footprint->radius && footprint->depth > depth)
+      depth = footprint->depth;
   }
   return depth;
 }
@@ -57,7 +57,7 @@ int hx_footprints_check(const unsigned char *bytes) {
   memcpy(&count, bytes + offsetof(hxFootprints, count), sizeof count);
   const int number = number_of(count);
   unsigned found = 0;
-  for (size_t i = offsetof(hxFootprints, print) + (size_t)number * sizeof(hxFootprint);
+  for (size_t i = offsetof(hxFootprints, footprint) + (size_t)number * sizeof(hxFootprint);
        i < sizeof(hxFootprints); ++i)
     found |= bytes[i];
   return found == 0 ? number : -1;
@@ -65,7 +65,7 @@ int hx_footprints_check(const unsigned char *bytes) {
 
 void hx_footprints_write(unsigned char *bytes, const hxFootprints *from) {
   const size_t end =
-      offsetof(hxFootprints, print) + (size_t)hx_footprints_number(from) * sizeof(hxFootprint);
+      offsetof(hxFootprints, footprint) + (size_t)hx_footprints_number(from) * sizeof(hxFootprint);
   memcpy(bytes, from, end);
   memset(bytes + end, 0, sizeof *from - end);
 }

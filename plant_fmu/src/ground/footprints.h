@@ -12,10 +12,10 @@
 
 HX_HIDDEN_BEGIN
 
-/* The last footprints; entry k of those made is print[k % HX_FOOTPRINTS]. */
+/* The last footprints; entry k of those made is footprint[k % HX_FOOTPRINTS]. */
 typedef struct hxFootprints {
   double count; /* 1  made since the start */
-  hxFootprint print[HX_FOOTPRINTS];
+  hxFootprint footprint[HX_FOOTPRINTS];
 } hxFootprints;
 
 /* A ring of footprints, and what the present call has overwritten in it. */
@@ -35,7 +35,7 @@ void hx_footprints_begin(hxFootprintLog *log);
 void hx_footprints_take_back(hxFootprintLog *log);
 
 /* Adds a footprint; the oldest one is forgotten when the ring is full. */
-void hx_footprints_add(hxFootprintLog *log, const hxFootprint *print);
+void hx_footprints_add(hxFootprintLog *log, const hxFootprint *footprint);
 
 /* Returns the depth of the deepest footprint around a point, 0 outside of all. */
 double hx_footprints_depth(const hxFootprints *footprints, double x, double y);

@@ -37,8 +37,8 @@ static inline void query_grid(const hxModel *model, const hxContactState *state,
                               int slot, const hxNumber point[3], hxFace *face) {
   const double real[3] = {hx_re(point[0]), hx_re(point[1]), hx_re(point[2])},
                none[2] = {-1.0, -1.0},
-               held[2] = {hx_re(state->cell[0][slot]), hx_re(state->cell[1][slot])};
-  hx_terrain_face(model->terrain, kind, kind == HX_FACE_NEAREST ? none : held, real, HX_HAS_SLOPES,
+               cell[2] = {hx_re(state->cell[0][slot]), hx_re(state->cell[1][slot])};
+  hx_terrain_face(model->terrain, kind, kind == HX_FACE_NEAREST ? none : cell, real, HX_HAS_SLOPES,
                   face);
 }
 

@@ -1,4 +1,4 @@
-/* sharing.h - shares of the faces, edges and corners of blocks that carry the same spot of a foot;
+/* sharing.h - shares of the faces, edges and corners of blocks that carry the same part of a foot;
  * models/contact/geometry.py is the readable form. For numbers with and without a derivative.
  */
 #ifndef HX_SHARING_H
@@ -7,7 +7,7 @@
 #include "../packs/lanes.h"
 #include "surface.h"
 
-enum { HX_SHARERS = HX_FACE_NEAREST }; /* faces of blocks that a foot touches at once, at most */
+enum { HX_SHARERS = HX_FACE_NEAREST }; /* faces of blocks in contact with a foot at once, at most */
 
 /* Contacts of one sphere that share its force. */
 typedef struct {
@@ -60,9 +60,9 @@ static inline int solve_carriers(const hxNumber G[HX_SHARERS][HX_SHARERS], const
   return 1;
 }
 
-/* Sets G, and returns whether contacts share a spot at all. */
-static inline int share_a_spot(const hxSharers *of, double radius,
-                               hxNumber G[HX_SHARERS][HX_SHARERS]) {
+/* Sets G, and returns whether any two contacts overlap. */
+static inline int contacts_overlap(const hxSharers *of, double radius,
+                                   hxNumber G[HX_SHARERS][HX_SHARERS]) {
   const double factor = 25.0; /* 1  of rho^2 */
   hxNumber deepest = of->depth[0];
   int found = 0;
@@ -101,7 +101,7 @@ static inline void hx_contact_shares(const hxSharers *of, double radius,
   hxNumber G[HX_SHARERS][HX_SHARERS];
   double best = -1.0;
   for (int i = 0; i < of->count; ++i) share[i] = 1.0;
-  if (of->count < 2 || !share_a_spot(of, radius, G)) return;
+  if (of->count < 2 || !contacts_overlap(of, radius, G)) return;
   if (of->count == 2) {
     share_between_two(of->depth, G[1][0], share);
     return;

@@ -144,18 +144,18 @@ static inline hxSoilCurves contact_area(const hxSoils *soil, hxReal z) {
 static inline hxSoilForces hx_soil_normal_force(const hxSoils *soil, hxReal plastic, hxReal z,
                                                 hxReal dz, hxSoilCurves virgin) {
   const hxReal zero = hx_splat(0.0);
-  const hxMask touches = hx_less(plastic, z);
-  if (!hx_any(touches)) return (hxSoilForces){zero, zero, zero, zero, zero};
+  const hxMask in_contact = hx_less(plastic, z);
+  if (!hx_any(in_contact)) return (hxSoilForces){zero, zero, zero, zero, zero};
   const hxMask yields = hx_is_yielding(soil, plastic, z, dz, virgin.force);
   const hxSoilCurves area = contact_area(soil, z);
   hxSoilCurves spring = elastic_force(soil, plastic, z, virgin);
   if (HX_HAS_SLOPES) spring = select_curves(yields, virgin, spring); /* for its derivative */
   const hxReal viscosity = soil->damping * area.force, force = spring.force + viscosity * dz;
-  const hxMask pushes = touches & hx_less(zero, force);
+  const hxMask pushes = in_contact & hx_less(zero, force);
   const hxReal along = hx_select(yields, virgin.slope, spring.slope);
   return (hxSoilForces){.force = hx_select(pushes, force, zero),
-                        .elastic = hx_select(touches, spring.force, zero),
-                        .slope = hx_select(touches, along, zero),
+                        .elastic = hx_select(in_contact, spring.force, zero),
+                        .slope = hx_select(in_contact, along, zero),
                         .stiffness =
                             hx_select(pushes, spring.slope + soil->damping * area.slope * dz, zero),
                         .viscosity = hx_select(pushes, viscosity, zero)};
@@ -164,10 +164,10 @@ static inline hxSoilForces hx_soil_normal_force(const hxSoils *soil, hxReal plas
 /* Returns the energy that unloading gives back, F^2/(2 A Ke) with F of eq. 44, J. */
 static inline hxReal hx_stored_energy(const hxSoils *soil, hxReal plastic, hxReal z,
                                       hxSoilCurves virgin) {
-  const hxMask touches = hx_less(plastic, z);
-  if (!hx_any(touches)) return hx_splat(0.0);
+  const hxMask in_contact = hx_less(plastic, z);
+  if (!hx_any(in_contact)) return hx_splat(0.0);
   const hxReal force = elastic_force(soil, plastic, z, virgin).force;
-  return hx_select(touches, force * force / (2.0 * soil->unloading), hx_splat(0.0));
+  return hx_select(in_contact, force * force / (2.0 * soil->unloading), hx_splat(0.0));
 }
 
 /* ---- shear ---- */
@@ -201,9 +201,9 @@ static inline hxReal hx_shear_base(const hxSoils *soil, hxReal z) {
 /* Forces on feet in contact with soil. */
 typedef struct {
   hxSoilForces normal;
-  hxReal held;   /* N    times the sinking speed: power that is stored */
-  hxReal stored; /* J    energy that unloading gives back */
-  hxReal hold;   /* N/m  shear over the bristle without load */
+  hxReal storage; /* N    times the sinking speed: power that is stored */
+  hxReal stored;  /* J    energy that unloading gives back */
+  hxReal hold;    /* N/m  shear over the bristle without load */
 } hxSoilContacts;
 
 /* Returns the forces on feet at these depths and sinking speeds. */
@@ -217,7 +217,7 @@ static inline hxSoilContacts hx_soil_contacts(const hxSoils *soil, hxReal plasti
   const hxReal base = hx_shear_base(soil, hx_select(above, plastic, z));
   const hxReal gains = hx_select(hx_less(zero, dz), f.slope / soil->unloading, hx_splat(1.0));
   return (hxSoilContacts){.normal = f,
-                          .held = f.elastic * gains,
+                          .storage = f.elastic * gains,
                           .stored = 0.5 * f.elastic * f.elastic / soil->unloading,
                           .hold = soil->per_displacement * base};
 }

@@ -90,7 +90,7 @@ static inline void sweep_force(const hxModel *model, hxJointWork *k, hxForce6 *p
 /* Computes the acceleration of a rotor from those of its joint and of the body that carries it
  * (eq. 54). */
 HX_RARE void rotor_motion(hxReal qdd, const hxMotion6 *a, hxJointWork *k) {
-  k->rotor.turn += hx_dot(k->sweep.S.ang, a->ang);
+  k->rotor.carrier += hx_dot(k->sweep.S.ang, a->ang);
   k->rotor.acceleration = qdd + k->driven;
 }
 
@@ -127,7 +127,7 @@ static inline void leg_multipliers(const hxModel *model, const hxImplicit *impli
     const hxReal along = hx_dot(about_joint, kin->s), inverse_sz = 1.0 / kin->sz;
     if (model->servo_mode == HX_SERVO_KINEMATIC) { /* the drive's torque is a multiplier (eq. 13) */
       k->torque = model->rotor_inertia * k->qdd - along;
-      if (model->spin) k->torque += model->spin_inertia * k->rotor.turn;
+      if (model->spin) k->torque += model->spin_inertia * k->rotor.carrier;
       k->servo.torque = k->torque - k->servo.friction;
     }
     k->reaction.lambda_lin = lin;

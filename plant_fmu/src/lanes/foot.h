@@ -106,7 +106,7 @@ HX_INLINE void replace_load(hxMask soft, const hxSoilPack *f, hxContactWork *con
   contact->stored = hx_select(
       soft, f->stored, 0.4 * contact->normal.elastic * hx_max(contact->kin.delta, hx_splat(0.0)));
   contact->normal.force = hx_select(soft, f->force, contact->normal.force);
-  contact->normal.elastic = hx_select(soft, f->held, contact->normal.elastic);
+  contact->normal.elastic = hx_select(soft, f->storage, contact->normal.elastic);
 }
 
 /* Replaces the forces on feet by those of soil where they touched down on it: f_n along the normal

@@ -39,7 +39,7 @@ static inline int is_in_soil(const hxContactState *state, int slot) {
 typedef struct {
   hxReal force;                /* N      f_n */
   hxReal stiffness, viscosity; /* N/m, N s/m  its derivatives by depth and sinking speed */
-  hxReal held;                 /* N      times the sinking speed: power that is stored */
+  hxReal storage;              /* N      times the sinking speed: power that is stored */
   hxReal stored;               /* J      that unloading gives back */
   hxReal hold, per_load;       /* N/m, 1/m  shear over the bristle: without load, of the load */
   hxReal per_displacement;     /* 1/m    1/K */
@@ -73,7 +73,7 @@ HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int slot, hxReal de
   return (hxSoilPack){.force = hx_select(in, f.normal.force, none),
                       .stiffness = hx_select(in, f.normal.stiffness, none),
                       .viscosity = hx_select(in, f.normal.viscosity, none),
-                      .held = hx_select(in, f.held, none),
+                      .storage = hx_select(in, f.storage, none),
                       .stored = hx_select(in, f.stored, none),
                       .hold = hx_select(in, f.hold, none),
                       .per_load = hx_select(in, soil.friction * soil.per_displacement, none),

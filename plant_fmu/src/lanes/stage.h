@@ -207,8 +207,8 @@ HX_RARE void rotor_coupling(const hxModel *model, hxLegWork *leg) {
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     hxJointWork *k = &leg->joint[joint];
     const hxVec3 s = k->sweep.S.ang;
-    k->rotor.turn = joint > 0 ? hx_dot(s, leg->joint[joint - 1].bias.ang) : hx_splat(0.0);
-    k->torque -= spin * k->rotor.turn;
+    k->rotor.carrier = joint > 0 ? hx_dot(s, leg->joint[joint - 1].bias.ang) : hx_splat(0.0);
+    k->torque -= spin * k->rotor.carrier;
     k->sweep.passed = hx_add_scaled(k->sweep.passed, spin * k->driven, s);
   }
 }

@@ -34,7 +34,7 @@ typedef struct {
   hxReal angle_shift, speed_shift; /* rad, rad/s  of eq. 20, without qdd's part */
   hxMotion6 acceleration;          /* a - g of the child at its centre of mass */
   struct {                         /* set if the rotors spin */
-    hxReal turn, acceleration;     /* rad/s2  the parent's about the axis, and the rotor's */
+    hxReal carrier, acceleration;  /* rad/s2  the parent's about the axis, and the rotor's */
   } rotor;
   struct { /* computed for the multipliers on request */
     hxJointKinematics kin;

@@ -152,7 +152,7 @@ static inline double hx_moment_and_bound(const hxModel *model, const hxModel *wh
       const hxVec3 s = hx_mul(R_Wi, hx_load_vec3(m->s_i, slot));
       hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub3(j.w, i.w)));
     }
-    hx_store_vec3(moment->turn, slot, j.w);
+    hx_store_vec3(moment->w, slot, j.w);
     row_moment(model, state, motion, &known, HX_FOOT, slot, all, &j, moment);
     if (model->rows > 1) further_moments(model, state, motion, &known, slot, all, &j, moment);
     if (whole) bound = tibia_depth_bound(whole, motion, slot, &j.R_WB, bound);
@@ -242,13 +242,13 @@ static inline void hx_fill_measured_slots(const hxModel *model, hxState *state) 
   fill_lines(&state->measured, HX_MEASURED_LINES);
 }
 
-/* Sets whether each foot touches the ground, by any of its rows. */
+/* Sets whether each foot is in contact with the ground, by any of its rows. */
 static inline void feet_on_ground(const hxModel *model, const hxContactState *contact,
-                                  int touches[HX_SLOTS]) {
+                                  int in_contact[HX_SLOTS]) {
   for (int slot = 0; slot < HX_SLOTS; ++slot) {
-    touches[slot] = 0;
+    in_contact[slot] = 0;
     for (int k = 0; k < model->foot_rows; ++k)
-      touches[slot] |= contact->closed[model->row[k]][slot] != 0.0;
+      in_contact[slot] |= contact->closed[model->row[k]][slot] != 0.0;
   }
 }
 

@@ -129,9 +129,9 @@ HX_RARE void add_stop_works(const hxPath *path, const hxImpulses *impulse, int p
 /* Adds what spin and rolling friction of a pack of feet lose in a step. */
 HX_RARE void add_turning_works(const hxPath *path, const hxImpulses *impulse, int pack,
                                hxStepWorks *works) {
-  const hxVec3 turn = mean_vec3(path->from->turn, path->to->turn, pack * HX_LANES);
+  const hxVec3 w = mean_vec3(path->from->w, path->to->w, pack * HX_LANES);
   for (int k = 0; k < path->model->foot_rows; ++k)
-    works->friction[pack] -= hx_dot(impulse->moment[path->model->row[k]][pack], turn);
+    works->friction[pack] -= hx_dot(impulse->moment[path->model->row[k]][pack], w);
 }
 
 /* Computes works and losses of a step from its impulses (eq. 27). */

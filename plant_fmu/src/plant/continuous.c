@@ -40,10 +40,10 @@ hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates 
   return HX_OK;
 }
 
-/* m  Half-width of the band in which contacts switch. A foot touches the ground at this depth and
- * leaves it at this height; within the band it switches together with another foot, if it moves in
- * that direction. Otherwise solvers that locate one foot's sign change would miss another's within
- * their rounding (docs/equations.md). */
+/* m  Half-width of the band in which contacts switch. A foot comes into contact at this depth and
+ * leaves the ground at this height; within the band it switches together with another foot, if it
+ * moves in that direction. Otherwise solvers that locate one foot's sign change would miss
+ * another's within their rounding (docs/equations.md). */
 static const double switch_band = 1e-10;
 
 /* Switches the contacts that are due and have no indicator: those of feet with walls. Others stay.
@@ -109,9 +109,9 @@ void hx_plant_indicators(const hxPlant *plant, hxIndicators *indicator) {
 
 /* Returns the penetration that makes a contact switch, or keep its state; outside of the band. */
 static double switching_depth(int closed, double delta, double ddelta) {
-  const int touches = closed ? !(delta <= -switch_band || (delta < 0.0 && ddelta < 0.0))
-                             : delta >= switch_band || (delta > 0.0 && ddelta > 0.0);
-  return touches ? fmax(delta, switch_band) : fmin(delta, -switch_band);
+  const int in_contact = closed ? !(delta <= -switch_band || (delta < 0.0 && ddelta < 0.0))
+                                : delta >= switch_band || (delta > 0.0 && ddelta > 0.0);
+  return in_contact ? fmax(delta, switch_band) : fmin(delta, -switch_band);
 }
 
 int hx_plant_update_contacts(hxPlant *plant) {

@@ -19,7 +19,7 @@ void hx_plant_derive_stops(hxPlant *plant) {
     *stop = model->joint[joint].own_stop;
     for (int slot = 0; slot < HX_SLOTS; ++slot) {
       if (plant->state.locked[joint][slot] == 0.0) continue;
-      stop->middle[slot] = plant->state.held[joint][slot], stop->half_range[slot] = 0.0;
+      stop->middle[slot] = plant->state.locked_angle[joint][slot], stop->half_range[slot] = 0.0;
       stop->stiffness[slot] = model->lock_stiffness, stop->damping[slot] = model->lock_damping;
       model->stops |= 2;
     }
@@ -48,11 +48,11 @@ int hx_plant_update_locks(hxPlant *plant, const hxInput *input) {
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const double angle = now.angle[leg][joint], lock = input->lock[leg][joint] >= 0.5;
       lost += stored(&plant->model.joint[joint].stop, leg, angle);
-      if (lock > state->locked[joint][leg]) state->held[joint][leg] = angle;
+      if (lock > state->locked[joint][leg]) state->locked_angle[joint][leg] = angle;
       state->locked[joint][leg] = lock;
     }
   for (int joint = 0; joint < HX_JOINTS; ++joint)
-    hx_fill_slots(state->locked[joint]), hx_fill_slots(state->held[joint]);
+    hx_fill_slots(state->locked[joint]), hx_fill_slots(state->locked_angle[joint]);
   hx_plant_derive_stops(plant);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint)

@@ -23,7 +23,7 @@ static const uint64_t saved_version = 19;
 /* Returns the checksum of a saved plant's bytes behind it, of the ring those of its footprints. */
 static uint64_t checksum(const unsigned char *bytes, int footprints) {
   const size_t used = (size_t)footprints * sizeof(hxFootprint),
-               end = offsetof(hxSavedPlant, footprints.print) + used;
+               end = offsetof(hxSavedPlant, footprints.footprint) + used;
   return hx_checksum(0, bytes + offsetof(hxSavedPlant, terrain),
                      end - offsetof(hxSavedPlant, terrain));
 }
