@@ -188,9 +188,9 @@ def put_at_start(model: Model, robot: Any, context: Context) -> None:
     """Sets the initial state of the definition."""
     plant, at = model.plant, robot.initial
     own = plant.GetMyMutableContextFromRoot(context)
-    rotation = RotationMatrix(Quaternion(np.array(at.quaternion) / np.linalg.norm(at.quaternion)))
-    origin = np.array(at.position) - rotation @ np.array(robot.torso.com)
-    plant.SetFreeBodyPose(own, model.torso, RigidTransform(rotation, origin))
+    R_WT = RotationMatrix(Quaternion(np.array(at.quaternion) / np.linalg.norm(at.quaternion)))
+    origin = np.array(at.position) - R_WT @ np.array(robot.torso.com)
+    plant.SetFreeBodyPose(own, model.torso, RigidTransform(R_WT, origin))
     for leg in range(LEGS):
         for k in range(JOINTS):
             joint = plant.GetJointByName(f"{leg}-{k}")

@@ -137,7 +137,7 @@ class FootPaths(Stateful):
                 goal=np.where(away, place, feet.goal), pull=np.where(away, 0.0, feet.pull)
             )
         clock, gait = self.clock, self.gait
-        back, tau = cis(-feet.turn), clock.progress(feet.phase)
+        R_KW, tau = cis(-feet.turn), clock.progress(feet.phase)
         s, slope = blend(tau)
         lift, climb = hop(tau, top=gait.step_height, down=gait.touchdown_speed * self.swing_time)
         folded = np.where(away, gait.step_height, 0.0)
@@ -150,12 +150,12 @@ class FootPaths(Stateful):
             lift = np.where(clock.dropped, np.maximum(high - fall * self.period, 0.0), lift)
             rise = np.where(clock.dropped, -fall, rise)
         # a foot on the ground: dp/dt = -(v + i w p)
-        was = back * (carried - feet.way)
+        was = R_KW * (carried - feet.way)
         motion = feet.twist.velocity + 1j * feet.twist.yaw_rate * was
-        velocity = back * feet.pull * (slope * pace) - motion
+        velocity = R_KW * feet.pull * (slope * pace) - motion
         feet = feet._replace(blend=np.where(clock.swinging, s, 0.0))
         return feet._replace(
-            plane=back * (self._ground_of(feet) - feet.way),
+            plane=R_KW * (self._ground_of(feet) - feet.way),
             height=self.home_height + np.where(clock.swinging, lift, folded),
             velocity=np.where(away, 0.0, velocity),
             rise=np.where(clock.swinging, rise, 0.0),

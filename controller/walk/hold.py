@@ -133,11 +133,11 @@ class Hold(Stateful):
 
     def _hold_path(self, seen: HoldInput) -> None:
         """Computes the added velocity that leads the robot back to its path (C39, C40)."""
-        gains, turned = self.gains, complex(cis(seen.yaw))
-        feet = turned * seen.plane
+        gains, R_WK = self.gains, complex(cis(seen.yaw))
+        feet = R_WK * seen.plane
         self._add_lost_way(seen, feet)
         self.last = feet, seen.load, seen.yaw
-        back = gains.path_rate * self.way * turned.conjugate()
+        back = gains.path_rate * self.way * R_WK.conjugate()
         self.velocity = back * (gains.speed_limit / max(abs(back), gains.speed_limit))
         turn = gains.path_rate * self.heading
         self.yaw_rate = min(max(turn, -gains.turn_limit), gains.turn_limit)

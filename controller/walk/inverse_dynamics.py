@@ -33,7 +33,7 @@ class Masses(NamedTuple):
     torso_place: complex  # m    x + i y, walking frame
     torso_height: float  # m    z, walking frame
     torso_ground: complex  # m    x + i y, ground frame
-    turn: complex  # 1    e^(i yaw) of the walking frame over the ground
+    R_WK: complex  # 1    e^(i yaw) of the walking frame over the ground
 
 
 class Demand(NamedTuple):
@@ -98,7 +98,7 @@ class InverseDynamics:
             way, turn: position and heading of the walking frame in the ground frame [m, rad].
             posture: of the torso in the walking frame.
         """
-        legs, turned = self.legs, cis(turn)
+        legs, R_WK = self.legs, cis(turn)
         knee = self.joint + pose.femur * legs.femur
         point = np.empty((LEGS, 3), dtype=np.complex128)
         point[:, 0] = self.com[:, 0]
@@ -113,11 +113,11 @@ class InverseDynamics:
             point=point,
             place=place,
             height=height + posture.height,
-            ground=way + turned * place,
+            ground=way + R_WK * place,
             torso_place=torso_place,
             torso_height=torso_height + posture.height,
-            torso_ground=way + turned * torso_place,
-            turn=turned,
+            torso_ground=way + R_WK * torso_place,
+            R_WK=R_WK,
         )
 
     def _acceleration(self, before: Any, now: Any, after: Any) -> Any:
@@ -147,13 +147,13 @@ class InverseDynamics:
                 before.torso_ground, now.torso_ground, after.torso_ground
             )
             up = self._acceleration(before.torso_height, now.torso_height, after.torso_height)
-            spin = self._acceleration(before.turn, now.turn, after.turn)
+            spin = self._acceleration(before.R_WK, now.R_WK, after.R_WK)
         pushed = (self.torso_mass + (ratio - 1.0) * self.total_mass) / ratio
-        push = pushed * acceleration * now.turn.conjugate()
+        push = pushed * acceleration * now.R_WK.conjugate()
         lift = self.torso_mass * (up + self.gravity)
         place, height = now.torso_place, now.torso_height
         push, weight, moment, twist = self._add_force(total, push, lift, place, height)
-        return push, weight, moment, twist + self.torso_inertia * across(now.turn, spin)
+        return push, weight, moment, twist + self.torso_inertia * across(now.R_WK, spin)
 
     def _demand_links(
         self, masses: tuple[Masses | None, Masses, Masses | None]
@@ -164,7 +164,7 @@ class InverseDynamics:
             return np.zeros((LEGS, 3), dtype=np.complex128), self.mass * self.gravity
         acceleration = self._acceleration(before.ground, now.ground, after.ground)
         up = self._acceleration(before.height, now.height, after.height)
-        push = self.mass * acceleration * now.turn.conjugate()
+        push = self.mass * acceleration * now.R_WK.conjugate()
         return push, self.mass * (up + self.gravity)
 
     def _demand_torques(self, motion: Neighbours, push: Plane, lift: Array, speed: Array) -> Array:

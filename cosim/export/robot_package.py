@@ -88,10 +88,11 @@ def read_values(texts: Iterable[str]) -> dict[str, dict[str, float]]:
     """Parses "COMPONENT.NAME=NUMBER" to values by component and name. Raises HexapodError."""
     found: dict[str, dict[str, float]] = {}
     for text in texts:
+        where = f"--set {text}"
         name, _, number = (part.strip() for part in text.partition("="))
         component, _, variable = name.partition(".")
         if component not in {PLANT, CONTROLLER}:
-            raise unknown_name("component", component, (PLANT, CONTROLLER), where=f"--set {text}")
+            raise unknown_name("component", component, (PLANT, CONTROLLER), where=where)
         if variable in GRAVITY_NAMES:
             raise HexapodError(
                 "gravity of one component alone",
@@ -99,17 +100,12 @@ def read_values(texts: Iterable[str]) -> dict[str, dict[str, float]]:
                 expected="the same for both",
                 fix="write gravity = [0, 0, -1.62] into the robot's file: gains and the standing "
                 "pose follow from it",
-                where=f"--set {text}",
+                where=where,
             )
         try:
             found.setdefault(component, {})[variable] = float(number)
         except ValueError as error:
+            what, expected = "not a number", "COMPONENT.NAME=NUMBER"
             fix = "write --set controller.command.vx=0.05"
-            raise HexapodError(
-                "not a number",
-                got=number,
-                expected="COMPONENT.NAME=NUMBER",
-                fix=fix,
-                where=f"--set {text}",
-            ) from error
+            raise HexapodError(what, got=number, expected=expected, fix=fix, where=where) from error
     return found

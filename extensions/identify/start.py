@@ -56,10 +56,10 @@ def initial_state(log: Log, robot: Robot) -> dict[str, float]:
         found[f"initial.{name}"] = float(angle.flat[k])
     for name in joint_names("speed"):
         found[f"initial.{name}"] = rate(name) if rest == 1 and log.has([name]) else 0.0
-    turn = _attitude(rows, robot, angle)
-    found |= dict(zip(vector_names("initial.quaternion", 4), turn.tolist(), strict=True))
+    q_WT = _attitude(rows, robot, angle)
+    found |= dict(zip(vector_names("initial.quaternion", 4), q_WT.tolist(), strict=True))
     place = vector_names("torso.position")
-    position = _resting(robot, angle, turn)
+    position = _resting(robot, angle, q_WT)
     if log.has(place):
         position = [mean(name) for name in place]
     found |= dict(zip(vector_names("initial.position"), position, strict=True))
@@ -87,9 +87,10 @@ def _attitude(rows: Recording, robot: Robot, angle: Array) -> Array:
         roll, pitch, yaw = (_mean(rows.column(name)) for name in ATTITUDE)
     elif robot.terrain.kind == "flat":
         roll, pitch = standing_attitude(robot, angle)
-    turn = axis_quaternion(np.array([0.0, 0.0, 1.0]), yaw)
-    turn = quaternion_product(turn, axis_quaternion(np.array([0.0, 1.0, 0.0]), pitch))
-    return quaternion_product(turn, axis_quaternion(np.array([1.0, 0.0, 0.0]), roll))
+    q_WV = axis_quaternion(np.array([0.0, 0.0, 1.0]), yaw)
+    q_VU = axis_quaternion(np.array([0.0, 1.0, 0.0]), pitch)
+    q_UT = axis_quaternion(np.array([1.0, 0.0, 0.0]), roll)
+    return quaternion_product(quaternion_product(q_WV, q_VU), q_UT)
 
 
 def standing_attitude(robot: Robot, angle: Array) -> tuple[float, float]:
@@ -104,12 +105,12 @@ def standing_attitude(robot: Robot, angle: Array) -> tuple[float, float]:
     return float(np.arctan2(up[1], up[2])), -float(np.arcsin(up[0]))
 
 
-def _resting(robot: Robot, angle: Array, turn: Array) -> list[float]:
+def _resting(robot: Robot, angle: Array, q_WT: Array) -> list[float]:
     """Returns the torso's position above the origin at which the lowest foot carries its share.
 
     The share is a sixth of the weight, under which the foot sinks in by (share/K)^(2/3) (eq. 14).
     """
     from_origin = foot_positions(robot, angle) - np.array(robot.torso.com)
-    lowest = float((from_origin @ rotation(turn).T)[:, 2].min())
+    lowest = float((from_origin @ rotation(q_WT).T)[:, 2].min())
     depth = (robot.weight / LEGS / robot.contact.stiffness) ** (2.0 / 3.0)
     return [0.0, 0.0, robot.terrain.height + robot.foot.radius - depth - lowest]

@@ -88,9 +88,9 @@ static inline void stand(const hxStepPlanner *model, const hxGaitClock *clock,
   for (int k = 0; k < HX_LEGS; ++k) step->height[k] = step->feet.height[k] - step->lowering[k];
   place_legs(model->leg, step);
   if (!model->is_compliant) return;
-  const hxPlane turn = hx_cis(step->feet.turn);
+  const hxPlane R_WK = hx_cis(step->feet.turn);
   hx_inverse_dynamics_place(&model->compliant.dynamics, model->leg, step->pose,
-                            hx_plane_add(step->feet.way, hx_times(turn, step->torso)), turn,
+                            hx_plane_add(step->feet.way, hx_times(R_WK, step->torso)), R_WK,
                             &step->posture, &step->masses);
 }
 

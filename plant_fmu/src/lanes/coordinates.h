@@ -30,7 +30,8 @@ static inline void place_link(const hxModel *model, int joint, int slot, hxReal 
   const hxQuat q_W0 = hx_quat_mul(q_Wi, q_i0), q_0j = {cosine, zero, zero, sine};
   hx_store_quat(&motion->link[joint][HX_P], slot, hx_quat_mul(q_W0, q_0j));
   const hxBody i = hx_parent_body(motion, joint, slot);
-  const hxVec3 s = hx_mul(i.R_WB, hx_load_vec3(m->s_i, slot)), w_j = hx_add_scaled(i.w, speed, s);
+  const hxMat3 R_Wi = i.R_WB;
+  const hxVec3 s = hx_mul(R_Wi, hx_load_vec3(m->s_i, slot)), w_j = hx_add_scaled(i.w, speed, s);
   hx_store_vec3(&motion->link[joint][HX_W], slot, w_j);
   const hxBody j = hx_link_body(motion, joint, slot);
   const hxJointKinematics k = hx_joint_kinematics(m, slot, &i, &j);

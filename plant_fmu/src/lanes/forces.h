@@ -38,7 +38,8 @@ static inline hxReal drive_acceleration(const hxModel *model, const hxCommand *c
  * velocity w_ij_j; the rest is solved in the child's axes. */
 static inline hxVec3 joint_bias(const hxModel *model, const hxJointKinematics *kin, hxVec3 w_i,
                                 const hxBody *j, hxReal speed, hxReal driven) {
-  const hxVec3 w_ij_j = hx_tmul(j->R_WB, hx_sub3(j->w, w_i)), x = hx_cross(w_i, j->w);
+  const hxMat3 *R_Wj = &j->R_WB;
+  const hxVec3 w_ij_j = hx_tmul(*R_Wj, hx_sub3(j->w, w_i)), x = hx_cross(w_i, j->w);
   const hxReal twice = hx_splat(2.0 * model->alpha),
                rest = hx_dot(w_ij_j, w_ij_j) - model->beta * model->beta;
   const hxReal along = driven - hx_dot(kin->s, x), inverse_sz = 1.0 / kin->sz;
@@ -48,7 +49,6 @@ static inline hxVec3 joint_bias(const hxModel *model, const hxJointKinematics *k
       kin->sy * rest - w_ij_j.y * speed - twice * (kin->sz * w_ij_j.x - kin->sx * w_ij_j.z);
   const hxReal dz = kin->sz * along + kin->sy * c4 - kin->sx * c5;
   const hxReal dx = (c5 + kin->sx * dz) * inverse_sz, dy = (kin->sy * dz - c4) * inverse_sz;
-  const hxMat3 *R_Wj = &j->R_WB;
   const hxVec3 d_j = {dx, dy, dz};
   return hx_add3(x, hx_mul(*R_Wj, d_j));
 }

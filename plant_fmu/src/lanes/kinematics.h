@@ -90,7 +90,8 @@ static inline hxConstraint hx_joint_constraint(const hxModel *model, const hxPla
   const hxVec3 r_i = hx_parent_vec3(motion, joint, HX_R, slot),
                v_i = hx_parent_vec3(motion, joint, HX_V, slot);
   const hxJointKinematics k = hx_joint_kinematics(&model->joint[joint], slot, &i, &j);
-  const hxVec3 w_ij_j = hx_tmul(j.R_WB, hx_sub3(j.w, i.w)); /* child's axes */
+  const hxMat3 R_Wj = j.R_WB;
+  const hxVec3 w_ij_j = hx_tmul(R_Wj, hx_sub3(j.w, i.w)); /* child's axes */
   const hxVec3 v_j = hx_link_vec3(motion, joint, HX_V, slot);
   return (hxConstraint){
       .phi_lin =
@@ -106,7 +107,8 @@ static inline void project_link(const hxModel *model, int joint, int slot, hxPla
   const hxBody i = hx_parent_body(motion, joint, slot), drifted = hx_link_body(motion, joint, slot);
   const hxVec3 r_i = hx_parent_vec3(motion, joint, HX_R, slot),
                v_i = hx_parent_vec3(motion, joint, HX_V, slot);
-  const hxVec3 s = hx_mul(i.R_WB, hx_load_vec3(model->joint[joint].s_i, slot)), z = drifted.R_WB.z;
+  const hxMat3 R_Wi = i.R_WB;
+  const hxVec3 s = hx_mul(R_Wi, hx_load_vec3(model->joint[joint].s_i, slot)), z = drifted.R_WB.z;
   const hxReal twice = 1.0 + hx_dot(z, s), scale = 1.0 / hx_sqrt(2.0 * twice);
   const hxVec3 u = hx_scale(scale, hx_cross(z, s));
   const hxQuat q_WV = {scale * twice, u.x, u.y, u.z}, q_Vj = hx_link_quat(motion, joint, slot);

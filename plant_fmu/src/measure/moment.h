@@ -148,7 +148,8 @@ static inline double hx_moment_and_bound(const hxModel *model, const hxModel *wh
       hx_joint_half_angle(m, slot, hx_parent_quat(motion, joint, slot),
                           hx_link_quat(motion, joint, slot), &sine, &cosine);
       hx_store(&moment->angle[joint][slot], hx_angle_from_half(sine, cosine));
-      const hxVec3 s = hx_mul(i.R_WB, hx_load_vec3(m->s_i, slot));
+      const hxMat3 R_Wi = i.R_WB;
+      const hxVec3 s = hx_mul(R_Wi, hx_load_vec3(m->s_i, slot));
       hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub3(j.w, i.w)));
     }
     hx_store_vec3(moment->w, slot, j.w);

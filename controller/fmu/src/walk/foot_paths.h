@@ -124,26 +124,26 @@ static inline hxPlane ground_of(const hxPlannedFeet *feet, int leg) {
 }
 
 /* Computes position and velocity of a foot with known phase, goal, pull and frame (C5 to C8).
- * carried: its position on the ground at the previous step; back: e^(-i turn). */
+ * carried: its position on the ground at the previous step; R_KW: e^(-i turn). */
 static inline void place_foot(const hxFootPathsModel *model, const hxFootPaths *paths, int leg,
-                              hxPlane back, hxPlane carried, hxPlannedFeet *feet) {
+                              hxPlane R_KW, hxPlane carried, hxPlannedFeet *feet) {
   const double tau = hx_gait_clock_progress(&model->clock, feet->phase[leg]),
                w = feet->twist.yaw_rate;
   const double high = feet->height[leg] - model->home_height[leg];
   double s, slope, lift, climb;
   if (paths->clock.absent[leg]) { /* the foot is above its stance position */
-    const hxPlane place = hx_times(hx_conj(back), aims(model, paths, leg));
+    const hxPlane place = hx_times(hx_conj(R_KW), aims(model, paths, leg));
     feet->goal[leg] = hx_plane_add(feet->way, place);
     feet->pull[leg] = hx_plane(0.0, 0.0);
   }
   blend(tau, &s, &slope);
   feet->blend[leg] = paths->clock.swinging[leg] ? s : 0.0;
-  const hxPlane was = hx_times(back, hx_plane_sub(carried, feet->way)), v = feet->twist.velocity;
-  feet->plane[leg] = hx_times(back, hx_plane_sub(ground_of(feet, leg), feet->way));
+  const hxPlane was = hx_times(R_KW, hx_plane_sub(carried, feet->way)), v = feet->twist.velocity;
+  feet->plane[leg] = hx_times(R_KW, hx_plane_sub(ground_of(feet, leg), feet->way));
   /* a foot on the ground: dp/dt = -(v + i w p) */
   /* 1/s  at which the foot passes through its path */
   const double pace = paths->clock.waiting ? 0.0 : 1.0 / model->swing_time;
-  const hxPlane pulled = hx_scaled(hx_times(back, feet->pull[leg]), slope * pace);
+  const hxPlane pulled = hx_scaled(hx_times(R_KW, feet->pull[leg]), slope * pace);
   feet->velocity[leg] = hx_plane(pulled.x - (v.x - w * was.y), pulled.y - (v.y + w * was.x));
   hop(tau, model->step_height, model->touchdown_speed * model->swing_time, &lift, &climb);
   feet->height[leg] = model->home_height[leg] + (paths->clock.swinging[leg] ? lift : 0.0);
@@ -173,7 +173,7 @@ static inline void set_out(const hxFootPathsModel *model, const hxFootPaths *pat
   first->way = present.way;
   first->turn = present.turn;
   first->twist = twist;
-  const hxPlane back = hx_cis(-first->turn);
+  const hxPlane R_KW = hx_cis(-first->turn);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     double s, slope;
     first->phase[leg] = hx_gait_clock_phase(&model->clock, leg, paths->clock.before);
@@ -183,7 +183,7 @@ static inline void set_out(const hxFootPathsModel *model, const hxFootPaths *pat
     first->rolled[leg] = present.rolled[leg];
     first->pull[leg] = paths->clock.swinging[leg] ? present.pull[leg] : hx_plane(0.0, 0.0);
     first->height[leg] = present.height[leg];
-    place_foot(model, paths, leg, back, ground_of(first, leg), first);
+    place_foot(model, paths, leg, R_KW, ground_of(first, leg), first);
     if (paths->clock.dropped[leg]) first->height[leg] = present.height[leg];
   }
 }
@@ -312,7 +312,7 @@ static inline void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFoo
   feet->turn = before->turn + yaw;
   feet->way = hx_plane_add(before->way, hx_times(hx_cis(before->turn), way));
   feet->twist = twist;
-  const hxPlane turn = hx_cis(feet->turn), back = hx_conj(turn);
+  const hxPlane R_WK = hx_cis(feet->turn), R_KW = hx_conj(R_WK);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     feet->phase[leg] =
         hx_gait_clock_phase(&model->clock, leg, hx_gait_clock_reached(&paths->clock, number));
@@ -321,7 +321,7 @@ static inline void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFoo
     const int free =
         paths->clock.swinging[leg] && (tau < freeze || (number == 1 && paths->clock.lifted[leg]));
     feet->goal[leg] =
-        free ? hx_plane_add(feet->way, hx_times(turn, landing(model, paths, leg, tau, twist)))
+        free ? hx_plane_add(feet->way, hx_times(R_WK, landing(model, paths, leg, tau, twist)))
              : before->goal[leg];
     /* the distance to the landing point is proportional to 1 - s (C5) */
     const double left = hx_larger(1.0 - before->blend[leg], nearly_done);
@@ -339,7 +339,7 @@ static inline void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFoo
       feet->pull[leg] = hx_plane(0.0, 0.0);
     }
     feet->height[leg] = before->height[leg];
-    place_foot(model, paths, leg, back, ground_of(before, leg), feet);
+    place_foot(model, paths, leg, R_KW, ground_of(before, leg), feet);
   }
 }
 

@@ -143,9 +143,9 @@ static inline void add_lost_way(const hxHoldModel *model, const hxHoldInput *see
 
 /* Computes the velocity that leads the robot back to its path (C39, C40). */
 static inline void hold_path(const hxHoldModel *model, const hxHoldInput *seen, hxHold *hold) {
-  const hxPlane turned = hx_cis(seen->yaw);
+  const hxPlane R_WK = hx_cis(seen->yaw);
   hxPlane foot[HX_LEGS];
-  for (int leg = 0; leg < HX_LEGS; ++leg) foot[leg] = hx_times(turned, seen->plane[leg]);
+  for (int leg = 0; leg < HX_LEGS; ++leg) foot[leg] = hx_times(R_WK, seen->plane[leg]);
   if (hold->looked) add_lost_way(model, seen, foot, hold);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     hold->foot[leg] = foot[leg];
@@ -153,7 +153,7 @@ static inline void hold_path(const hxHoldModel *model, const hxHoldInput *seen, 
   }
   hold->yaw = seen->yaw;
   hold->looked = 1;
-  const hxPlane back = hx_times(hx_scaled(hold->way, model->path_rate), hx_conj(turned));
+  const hxPlane back = hx_times(hx_scaled(hold->way, model->path_rate), hx_conj(R_WK));
   hold->velocity = hx_scaled(back, model->speed_limit / fmax(hx_length(back), model->speed_limit));
   hold->yaw_rate =
       hx_clamp(model->path_rate * hold->heading, -model->turn_limit, model->turn_limit);

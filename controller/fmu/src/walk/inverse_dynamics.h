@@ -32,7 +32,7 @@ typedef struct hxMasses {
   hxPlane ground[HX_LEGS][HX_JOINTS]; /* m  relative to the ground, from the start of the walk */
   hxPlane torso_place, torso_ground;  /* m */
   double torso_height;                /* m */
-  hxPlane turn;                       /* 1   e^(i yaw) of the walking frame */
+  hxPlane R_WK;                       /* 1   e^(i yaw) of the walking frame */
 } hxMasses;
 
 /* Torques and ground forces that a planned motion requires at one step. */
@@ -93,9 +93,9 @@ static inline void hx_inverse_dynamics_compile(const hxControllerDefinition *def
 
 static inline void hx_inverse_dynamics_place(const hxInverseDynamics *model,
                                              const hxLegSolver leg[HX_LEGS],
-                                             const hxPose pose[HX_LEGS], hxPlane way, hxPlane turn,
+                                             const hxPose pose[HX_LEGS], hxPlane way, hxPlane R_WK,
                                              const hxPosture *posture, hxMasses *masses) {
-  masses->turn = turn;
+  masses->R_WK = R_WK;
   for (int k = 0; k < HX_LEGS; ++k) {
     const hxPose *p = &pose[k];
     const hxPlane joint = hx_plane(leg[k].coxa_length, leg[k].coxa_height),
@@ -114,14 +114,14 @@ static inline void hx_inverse_dynamics_place(const hxInverseDynamics *model,
       hx_posture_turn(posture, &place, &height);
       masses->place[k][link] = place;
       masses->height[k][link] = height + posture->height;
-      masses->ground[k][link] = hx_plane_add(way, hx_times(masses->turn, place));
+      masses->ground[k][link] = hx_plane_add(way, hx_times(masses->R_WK, place));
     }
   }
   masses->torso_place = model->torso_com;
   masses->torso_height = model->torso_com_z;
   hx_posture_turn(posture, &masses->torso_place, &masses->torso_height);
   masses->torso_height += posture->height;
-  masses->torso_ground = hx_plane_add(way, hx_times(masses->turn, masses->torso_place));
+  masses->torso_ground = hx_plane_add(way, hx_times(masses->R_WK, masses->torso_place));
 }
 
 /* ------------------------------------------------------------------------------------- forces */
@@ -157,13 +157,13 @@ static inline void demand_torso(const hxInverseDynamics *model, const hxNeighbou
     a = plane_acceleration(before->torso_ground, now->torso_ground, after->torso_ground,
                            model->period);
     up = acceleration(before->torso_height, now->torso_height, after->torso_height, model->period);
-    spin = plane_acceleration(before->turn, now->turn, after->turn, model->period);
+    spin = plane_acceleration(before->R_WK, now->R_WK, after->R_WK, model->period);
   }
   const double pushed = (model->torso_mass + (ratio - 1.0) * model->total_mass) / ratio;
-  const hxPlane push = hx_times(hx_scaled(a, pushed), hx_conj(now->turn));
+  const hxPlane push = hx_times(hx_scaled(a, pushed), hx_conj(now->R_WK));
   add_force(push, model->torso_mass * (up + model->gravity), now->torso_place, now->torso_height,
             model->floor, demand);
-  demand->twist += model->torso_inertia * hx_across(now->turn, spin);
+  demand->twist += model->torso_inertia * hx_across(now->R_WK, spin);
 }
 
 /* Adds m (a + g) of the links of a leg to the demand (C16, C56), and returns it in the torso
@@ -182,7 +182,7 @@ static inline void demand_links(const hxInverseDynamics *model, const hxNeighbou
       up = acceleration(before->height[leg][link], now->height[leg][link], after->height[leg][link],
                         model->period);
     }
-    push[link] = hx_times(hx_scaled(a, mass), hx_conj(now->turn));
+    push[link] = hx_times(hx_scaled(a, mass), hx_conj(now->R_WK));
     lift[link] = mass * (up + model->gravity);
     add_force(hx_scaled(push[link], 1.0 / ratio), lift[link], now->place[leg][link],
               now->height[leg][link], model->floor, demand);
