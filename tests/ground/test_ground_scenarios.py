@@ -82,7 +82,7 @@ REFUSED = [
     (
         ["terrain.kind=plane", "terrain.patch=[{x=0, y=0, size=1, soil='mood'}]"],
         "soil",
-        "stand.toml: terrain.patch[0].soil",
+        "--set terrain.patch[0].soil",
     ),
     (
         [
