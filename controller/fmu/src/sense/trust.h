@@ -50,7 +50,8 @@ static inline void hx_trust_compile(const hxControllerDefinition *definition, hx
   const double period = definition->period, cycle = definition->gait.period;
   model->period = period;
   model->follow_load = 1.0 - hx_decay(-period / definition->gains.support.load_time);
-  model->calm = (int64_t)nearbyint(calm_cycles * cycle / period);
+  const double calm = nearbyint(calm_cycles * cycle / period);
+  model->calm = (int64_t)calm;
 }
 
 /* Advances the trust by one period (C33) and returns the level that it goes to, 0 or 1. drag: the
