@@ -50,7 +50,7 @@ NEEDS_PUBLIC_CALL = pytest.mark.usefixtures("plant_build")
 SHORT = {"duration": 0.3}
 CYCLES = {"duration": 3, "gait.period": 0.8}
 ROBOT, FLAT = load_robot("athena"), load_scenario("walk_flat")
-CONTROLLER = {"robot": ROBOT, "period": 0.005, "gait": make_gait(ROBOT)}
+CONTROLLER: dict[str, Any] = {"robot": ROBOT, "period": 0.005, "gait": make_gait(ROBOT)}
 
 
 class Stand:

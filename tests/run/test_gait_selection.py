@@ -14,7 +14,7 @@ from hexapod_cosim.cosim.run.gait_selection import GaitSelection, select_gait
 from hexapod_cosim.cosim.run.plan import make_plan
 from hexapod_cosim.cosim.scenario.reading import scenario_from_table
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.cosim.scenario.tables import with_overrides
+from hexapod_cosim.cosim.scenario.tables import read_overrides, with_values
 from hexapod_cosim.models import ScenarioError, load_robot
 
 ATHENA = load_robot("athena")
@@ -23,7 +23,7 @@ AGREEMENT = 1e-12  # rad    of joint angles, of both implementations
 
 def scenario(*settings: str, control: str = "compliant") -> Scenario:
     table = {"control": control, "duration": 0.3, "command": {"vx": 0.08}}
-    return scenario_from_table(with_overrides(table, settings), where="mine.toml")
+    return scenario_from_table(with_values(table, read_overrides(settings)), where="mine.toml")
 
 
 def walk(*settings: str, control: str = "compliant") -> GaitSelection:

@@ -203,7 +203,8 @@ def remembered(plant: Plant) -> Array:
 
 def ends_of_calls(count: int, seed: int) -> list[float]:
     """Returns ends [s] of calls of different lengths, the first after 0 s."""
-    return np.cumsum(np.random.default_rng(seed).uniform(1e-3, 2e-2, count)).tolist()
+    lengths = np.random.default_rng(seed).uniform(1e-3, 2e-2, count)
+    return [float(end) for end in np.cumsum(lengths)]
 
 
 def test_a_setpoint_reaches_its_goal_after_the_way_over_the_speed(core: ct.CDLL) -> None:
@@ -264,7 +265,8 @@ def test_the_firmware_remembers_what_the_twin_does_to_the_last_bit(
         output = plant.output()
         lag = setpoint + h * rate - output.angle
         wanted = kp * lag + kd * (command.speed_ref - output.speed)
-        loaded, start = count_overload(servo, wanted + command.torque_ref, loaded, h), end
+        loaded = np.asarray(count_overload(servo, wanted + command.torque_ref, loaded, h))
+        start = end
         found = remembered(plant)
         assert np.array_equal(found[:3], [setpoint, rate, loaded])
         assert found[3] == pytest.approx(share, rel=SAME)
@@ -274,7 +276,7 @@ def test_the_firmware_remembers_what_the_twin_does_to_the_last_bit(
 
 def test_servos_on_a_bus_hold_the_rounded_commands_that_the_twin_does(core: ct.CDLL) -> None:
     robot = changed(load_robot("athena"), servo={"bus_period": 0.01, "command_step": 0.0015})
-    plant, time, held = Plant(core, robot), 0.0025 * np.arange(40), []
+    plant, time, held = Plant(core, robot), 0.0025 * np.arange(40.0), []
     angle = np.array([random_command(robot, k, size=0.2).angle_ref for k in range(len(time))])
     for k, command in enumerate(angle):
         plant.step(0.0025 * (k + 1), Command(angle_ref=command))
