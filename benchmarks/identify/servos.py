@@ -168,7 +168,7 @@ def compared(
         ordered = sorted(range(len(logs)), key=lambda k: errors[k].angle)
         for word, k in (("best", ordered[0]), ("worst", ordered[-1])):
             one = Bench([logs[k]])
-            figure = drawn(BenchReplay(one, fitted.swing(one), servo, errors[k]))
+            figure = drawn(BenchReplay(one, fitted.swing(one), fitted, errors[k]))
             path = pictures / f"servo-{name}-{word}.png"
             figure.savefig(path, dpi=120, metadata={"Software": None})
     numbers = [mean.angle, mean.speed, mean.duty, mean.torque, bam_angle(servo, logs, *values)]

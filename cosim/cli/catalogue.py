@@ -84,10 +84,10 @@ def soils() -> Rows:
 
 
 def servos() -> Rows:
-    """Returns the measured servos: friction model, voltage [V], stall torque [N m], no-load speed
-    [rad/s], and the source of their numbers.
+    """Returns the measured servos: friction model, voltage [V], torque at stall within the
+    firmware's current [N m], no-load speed [rad/s], and the source of their numbers.
     """
-    from hexapod_cosim.models.servos.motor import no_load_speed, stall_torque
+    from hexapod_cosim.models.servos.motor import no_load_speed
     from hexapod_cosim.models.servos.presets import list_servos, measured_servo
 
     found = {name: measured_servo(name) for name in list_servos()}
@@ -96,7 +96,7 @@ def servos() -> Rows:
             "name": name,
             "friction": one.about.friction_model,
             "voltage": one.servo.voltage,
-            "stall": stall_torque(one.servo),
+            "stall": one.servo.torque_limit,
             "no load": no_load_speed(one.servo),
             "about": one.about.title,
             "source": one.about.source,

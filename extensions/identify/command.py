@@ -10,8 +10,16 @@ from typing import Annotated
 import typer
 
 from hexapod_cosim.cosim.cli.options import Json, RobotName, Workers, command_line
-from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table, show_text, warn
+from hexapod_cosim.cosim.cli.terminal import (
+    refuse_unused,
+    show_files,
+    show_json,
+    show_table,
+    show_text,
+    warn,
+)
 from hexapod_cosim.cosim.results.folder import results_folder
+from hexapod_cosim.extensions.identify.bench import is_bench_log
 from hexapod_cosim.extensions.identify.bench.log import GROUPINGS
 from hexapod_cosim.extensions.identify.log import HELD_OUT, read_log
 from hexapod_cosim.extensions.identify.numbers.servo import TERMS, with_friction_model
@@ -25,7 +33,8 @@ Logs = Annotated[
     typer.Argument(
         metavar="[servo] LOG...",
         help="CSV, Parquet or MCAP files with commands and readings, each from standing still on. "
-        "Behind the word servo: JSON logs of one servo on a pendulum bench.",
+        "Behind the word servo: JSON logs of one servo on a pendulum bench: an XL330 (BAM), or "
+        "a STS3215 or STS3250 (K-Scale).",
     ),
 ]
 Find = Annotated[
@@ -66,6 +75,7 @@ Folder = Annotated[
 
 
 def identify(
+    context: typer.Context,
     logs: Logs,
     robot: RobotName = "athena",
     find: Find = None,
@@ -78,12 +88,18 @@ def identify(
 ) -> None:
     """Find a robot's masses, servos, contacts and sensors from its own logs."""
     if str(logs[0]) == SERVO_WORD:
+        unused = {"find": "--find", "held_out": "--held-out"}
+        refuse_unused(context, unused, written="logs of a servo bench", fix="use --hold-out")
         _identify_servo(logs[1:], robot, friction, hold_out, workers, output, json)
         return
     # imported only here because they are slow to import
     from hexapod_cosim.cosim.run.worker_pool import processor_count  # noqa: PLC0415
     from hexapod_cosim.extensions.identify import identification, results  # noqa: PLC0415
 
+    bench = [str(path) for path in logs if is_bench_log(path)]
+    if bench:
+        expected, fix = "the word servo before it", f"hexapod identify servo {' '.join(bench)}"
+        raise HexapodError("a servo bench's log", got=bench[0], expected=expected, fix=fix)
     groups = _checked(find or list(FOUND))
     own = load_robot(robot)
     if friction is not None:
@@ -133,18 +149,15 @@ def _identify_servo(
     if by not in GROUPINGS:
         raise unknown_name("grouping of logs", by, GROUPINGS, where="--hold-out")
     if not logs:
-        raise HexapodError(
-            "no bench logs",
-            got=f"the word {SERVO_WORD!r} alone",
-            expected="JSON files of BAM or K-Scale behind it",
-            fix="hexapod identify servo logs/*.json",
-            where="LOG",
-        )
+        got, expected = f"the word {SERVO_WORD!r} alone", "JSON files of BAM or K-Scale behind it"
+        fix = "hexapod identify servo logs/*.json"
+        raise HexapodError("no bench logs", got=got, expected=expected, fix=fix)
     options = {"robot": robot, "hold_out": by, "friction": friction}
+    own = load_robot(robot)
     with results_folder(output or Path("out") / "identify") as folder:
         found = command.identified_servo(
             logs,
-            load_robot(robot),
+            own,
             friction=friction,
             by=by,
             workers=workers or processor_count(),
@@ -153,6 +166,8 @@ def _identify_servo(
         folder.begin()
         written = command_line("identify", SERVO_WORD, *logs, **options)
         files = command.write_servo(found, folder.path, command=written, by=by)
+    for text in command.motor_warnings(own, found.held_out[0][0].motor):
+        warn(text.removesuffix("."))
     if json:
         show_json({**command.result_table(found), "files": [str(path) for path in files]})
         return

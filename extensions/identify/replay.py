@@ -14,7 +14,14 @@ import numpy as np
 import typer
 
 from hexapod_cosim.cosim.cli.options import FmuFile, Json, RobotName, command_line
-from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table, waiting, warn
+from hexapod_cosim.cosim.cli.terminal import (
+    refuse_unused,
+    show_files,
+    show_json,
+    show_table,
+    waiting,
+    warn,
+)
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant import export_fmu
@@ -167,6 +174,7 @@ Folder = Annotated[
 
 
 def replay_command(
+    context: typer.Context,
     log: LogFile,
     robot: RobotName = "athena",
     fmu: FmuFile = None,
@@ -176,6 +184,9 @@ def replay_command(
     """Drive the plant FMU with a recorded log and compare all readings with it."""
     own = load_robot(robot)
     if is_bench_log(log):
+        refuse_unused(
+            context, {"fmu": "--fmu"}, written="the log of a servo bench", fix="leave it out"
+        )
         _replay_bench(log, own, output, command_line("replay", log, robot=robot), json)
         return
     command = command_line("replay", log, robot=robot, fmu=fmu)
@@ -204,6 +215,8 @@ def _replay_bench(log: Path, robot: Robot, output: Path | None, command: str, js
             done = bench.replayed(log, robot)
         folder.begin()
         files = bench.write_replay(done, folder.path, command=command)
+    for text in done.warnings:
+        warn(text.removesuffix("."))
     if json:
         show_json({"errors": asdict(done.errors), "files": [str(path) for path in files]})
         return

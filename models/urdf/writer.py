@@ -74,7 +74,7 @@ def _leg(root: ET.Element, leg: Leg, robot: Robot, links: list[tuple[str, Link]]
         add(joint, "axis", xyz=link.axis)
         limit = add(joint, "limit", lower=link.angle_min, upper=link.angle_max)
         limit.attrib |= {
-            "effort": repr(robot.servo.torque_max),
+            "effort": repr(robot.servo.torque_limit),
             "velocity": repr(robot.servo.speed_max),
         }
         add(joint, "dynamics", damping="0.0", friction=robot.servo.coulomb_friction)

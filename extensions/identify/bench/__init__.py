@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hexapod_cosim.cosim.common.files import why_unreadable
 from hexapod_cosim.extensions.identify.bench import bam, kscale
-from hexapod_cosim.extensions.identify.bench.log import BenchLog
+from hexapod_cosim.extensions.identify.bench.log import BenchLog, check_log
 from hexapod_cosim.extensions.identify.log import LogError
 
 
@@ -17,11 +17,11 @@ def is_bench_log(path: Path) -> bool:
 
 
 def read_bench_log(path: Path) -> BenchLog:
-    """Reads a log of BAM or K-Scale. Raises LogError for another file."""
+    """Reads a log of BAM or K-Scale. Raises LogError for another file and unusable rows."""
     try:
         table = json.loads(path.read_text(encoding="utf-8"))
         read = kscale.read if "actuator_id" in table else bam.read
-        return read(path, table)
+        log = read(path, table)
     except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
         raise LogError(
             "no log of a servo bench",
@@ -30,3 +30,5 @@ def read_bench_log(path: Path) -> BenchLog:
             fix="name the raw logs, as they were recorded",
             where=str(path),
         ) from error
+    check_log(log)
+    return log

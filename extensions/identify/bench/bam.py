@@ -1,4 +1,4 @@
-"""Reads logs of BAM (github.com/Rhoban/bam): a Dynamixel servo that reports its duty as load.
+"""Reads logs of BAM (github.com/Rhoban/bam): an XL330, which reports its duty as load.
 
 Within a row the goal reaches the servo 3.0 ms before the row's time; the angle is read 1.4 ms, the
 (late) speed 0.7 ms before it, the voltage 0.7 ms after it.
@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.extensions.identify.bench.log import SPEED_DELAY, BenchLog, column
+from hexapod_cosim.extensions.identify.bench.log import SPEED_DELAY, BenchLog, column, figure
 
-FULL_DUTY = 885.0  # of the load
-GAIN = 4096.0 / (2.0 * math.pi) / (256.0 * FULL_DUTY)  # 1/rad for each unit of the register
+FULL_DUTY = {"xl330": 885.0}  # of the load, by motor
+GAIN = 4096.0 / (2.0 * math.pi) / 256.0  # load for each radian of error and unit of the register
 SIGNED = 32767.0  # of a 16-bit number
 ANGLE, SPEED, VOLTAGE = (
     -0.0014,
@@ -30,10 +30,11 @@ def read(path: Path, table: Mapping[str, Any]) -> BenchLog:
     entries = table["entries"]
     time, load = column(entries, "timestamp"), column(entries, "load")
     speed, voltage = column(entries, "speed"), column(entries, "input_volts")
+    full_duty = figure(FULL_DUTY, table["motor"], "motor", str(path))
     return BenchLog(
         where=str(path),
         motor=table["motor"],
-        gain=GAIN * table["kp"],
+        gain=GAIN / full_duty * table["kp"],
         register=table["kp"],
         mass=float(table["mass"]),
         rod=table.get("arm_mass", 0.0),
@@ -43,7 +44,7 @@ def read(path: Path, table: Mapping[str, Any]) -> BenchLog:
         goal=column(entries, "goal_position"),
         angle=column(entries, "position"),
         speed=np.interp(time + ANGLE, time + SPEED, speed),
-        duty=np.where(load > SIGNED, load - 2.0 * (SIGNED + 1.0), load) / FULL_DUTY,
+        duty=np.where(load > SIGNED, load - 2.0 * (SIGNED + 1.0), load) / full_duty,
         voltage=np.interp(time + ANGLE, time + VOLTAGE, voltage),
         on=column(entries, "torque_enable"),
     )

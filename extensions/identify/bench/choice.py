@@ -25,6 +25,8 @@ class Choice:
     fit: ServoFit  # to all logs
     held_out: tuple[tuple[BenchLog, Errors], ...]  # each log, by a fit that did not see its group
     models: dict[str, Errors]  # means over the held-out logs, of all models that were compared
+    start: Errors  # likewise, of the servo that the search began at; offset and delay fitted
+    robot: Robot  # with that servo
 
 
 def splits(logs: Sequence[BenchLog], by: str) -> list[Split]:
@@ -35,13 +37,10 @@ def splits(logs: Sequence[BenchLog], by: str) -> list[Split]:
     group = GROUPINGS[by]
     groups = sorted({group(log) for log in logs}, key=str)
     if len(groups) < 2:
-        raise HexapodError(
-            "no logs to hold out",
-            got=f"{len(logs)} logs of the same {by}",
-            expected="logs of at least two",
-            fix=f"name further logs, or --hold-out {'|'.join(GROUPINGS)}",
-            where="--hold-out",
-        )
+        others = [key for key, one in GROUPINGS.items() if len({one(log) for log in logs}) > 1]
+        got, expected = f"{by} {groups[0]} in each log", f"logs that differ in their {by}"
+        fix = f"give --hold-out {'|'.join(others)}" if others else "name further logs"
+        raise HexapodError("no logs to hold out", got=got, expected=expected, fix=fix)
     return [
         ([log for log in logs if group(log) != own], [log for log in logs if group(log) == own])
         for own in groups
@@ -69,24 +68,33 @@ def choose(
     """
     seen, unseen = zip(*splits(logs, by), strict=True)
     progress(f"{', '.join(models)}: {len(seen)} times without one {by}")
-    found = list(pool.map(fitted_and_judged, seen, unseen, repeat(robot), repeat(models)))
-    errors = {key: [error for own in found for error in own[key]] for key in models}
-    fits = {key: Errors.mean(own) for key, own in errors.items()}
+    keys = (None, *models)  # None: the servo as it is
+    found = list(pool.map(fitted_and_judged, seen, unseen, repeat(robot), repeat(keys)))
+    errors = {key: [error for own in found for error in own[key]] for key in keys}
+    fits = {key: Errors.mean(errors[key]) for key in models}
+    start = Errors.mean(errors[None])
     best = min(one.angle for one in fits.values())
-    model = next(key for key in models if fits[key].angle <= (1.0 + WORTH) * best)
+    most = (1.0 + WORTH) * best
+    if best < start.angle:
+        most = min(most, start.angle)
+    model = next(key for key in models if fits[key].angle <= most)
     progress(f"{model}, all logs")
     return Choice(
         model=model,
         fit=fit_servo(logs, robot, model),
         held_out=tuple(zip([log for own in unseen for log in own], errors[model], strict=True)),
         models=fits,
+        start=start,
+        robot=robot,
     )
 
 
 def fitted_and_judged(
-    seen: Sequence[BenchLog], unseen: Sequence[BenchLog], robot: Robot, models: Sequence[str]
-) -> dict[str, list[Errors]]:
-    """Returns the errors of fits of models over each of some logs that they did not see."""
+    seen: Sequence[BenchLog], unseen: Sequence[BenchLog], robot: Robot, models: Sequence[str | None]
+) -> dict[str | None, list[Errors]]:
+    """Returns the errors of fits of models over each of some logs that they did not see; None: of
+    the robot's own servo, with the bench's offset and delay fitted.
+    """
     known: dict[str | None, ServoFit] = {}
     return {
         model: judged(fit_servo(seen, robot, model, seeds=1, known=known), unseen)

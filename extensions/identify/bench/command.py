@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import textwrap
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, fields, replace
@@ -19,15 +20,15 @@ from hexapod_cosim.cosim.report.page import render
 from hexapod_cosim.extensions.identify.bench import read_bench_log
 from hexapod_cosim.extensions.identify.bench.choice import Choice, choose
 from hexapod_cosim.extensions.identify.bench.errors import Errors, log_errors
-from hexapod_cosim.extensions.identify.bench.fit import BENCH, fit_servo
+from hexapod_cosim.extensions.identify.bench.fit import ServoFit, fit_servo
 from hexapod_cosim.extensions.identify.bench.log import BenchLog
 from hexapod_cosim.extensions.identify.bench.pendulum import Bench, Swing
-from hexapod_cosim.extensions.identify.numbers.servo import TERMS
+from hexapod_cosim.extensions.identify.numbers.servo import STRIBECK, TERMS
 from hexapod_cosim.extensions.identify.report import embedded, number
 from hexapod_cosim.models import HexapodError, Robot
 from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.servos.motor import torque_per_volt
-from hexapod_cosim.models.servos.presets import followed, list_servos, measured_servo
+from hexapod_cosim.models.servos.presets import FOLLOWING, followed, list_servos, measured_servo
 
 PRESETS = {"xl330": "xl330_fitted", "sts3215": "sts3215_12v", "sts3250": "sts3250"}  # of motors
 # Where a fit begins: servos that others published, with the makers' stall currents [A] and no-load
@@ -43,35 +44,38 @@ STARTS: dict[str, tuple[str, dict[str, Any]]] = {
 SERVO, RESULT, REPORT = "servo.toml", "identify.json", "report.html"
 NUMBERS = ("number", "unit", "start", "found", "95 % interval")
 ERRORS = ("angle [deg]", "speed [rad/s]", "duty", "torque")
-# of a servo's table besides what a fit finds
-GIVEN = ("voltage", "duty_max", "torque_continuous", "friction_speed")
-FOUND = (
-    "torque_constant", "resistance", "rotor_inertia", "coulomb_friction", "viscous_friction",
-    "stribeck_friction", "motor_load_friction", "external_load_friction",
-    "stribeck_motor_load_friction", "stribeck_external_load_friction",
-    "quadratic_motor_friction", "quadratic_external_friction", "stribeck_speed",
-    "stribeck_exponent", "current_max", "goal_speed_max", "overload_time", "overload_duty",
-    "overload_left",
-)  # fmt: skip
+# of a servo's table these follow from the others; kp from duty_gain
+DERIVED = ("mode", "drive", "kp", "kd", *FOLLOWING)
+CURVE = ("stribeck_speed", "stribeck_exponent")  # without a term of STRIBECK they are unused
+MOTOR = ("torque_constant", "resistance", "rotor_inertia")  # tell one measured servo from another
 
 
 def with_start(robot: Robot, logs: Sequence[BenchLog], *, preset: bool = False) -> Robot:
     """Returns the robot with the servo that a fit to logs begins at: its own measured one, or
-    that of STARTS for the logs' motor, or of PRESETS. Raises HexapodError where there is none.
+    that of STARTS for the logs' motor, or of PRESETS.
     """
     motor = logs[0].motor
     if robot.servo.drive == "motor":
         return robot
-    if motor not in STARTS:
-        raise HexapodError(
-            "no servo to begin with",
-            got=f"logs of {motor!r} and a robot without a measured servo",
-            expected=f"one of {', '.join(list_servos())}",
-            fix='name a robot file with [servo] model = "..." as --robot',
-            where=logs[0].where,
-        )
     name, changed = (PRESETS[motor], {}) if preset else STARTS[motor]
     return replace(robot, servo=followed(replace(measured_servo(name).servo, **changed)))
+
+
+def servo_name(robot: Robot) -> str:
+    """Returns the name of the measured servo whose motor a robot has, or the robot's."""
+    own = [getattr(robot.servo, key) for key in MOTOR]
+    for name in list_servos():
+        if own == [getattr(measured_servo(name).servo, key) for key in MOTOR]:
+            return name
+    return f"that of robot {robot.name}"
+
+
+def motor_warnings(robot: Robot, motor: str) -> list[str]:
+    """Returns a warning if a robot's servo is known to be of another motor than a log."""
+    name = servo_name(robot)
+    if name not in list_servos() or name.startswith(motor):
+        return []
+    return [f"the log is of a {motor}, but the servo of robot {robot.name} is {name}."]
 
 
 def identified_servo(
@@ -85,6 +89,10 @@ def identified_servo(
 ) -> Choice:
     """Reads bench logs and fits their servo. Raises HexapodError."""
     logs = [read_bench_log(path) for path in paths]
+    motors = sorted({log.motor for log in logs})
+    if len(motors) > 1:
+        got, fix = ", ".join(motors), "identify each motor with its own logs"
+        raise HexapodError("logs of several motors", got=got, expected="one motor", fix=fix)
     models = [friction] if friction else list(TERMS)
     robot = with_start(robot, logs)
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
@@ -96,6 +104,7 @@ def result_table(found: Choice) -> dict[str, Any]:
     fit = found.fit
     return {
         "model": found.model,
+        "start": {"servo": servo_name(found.robot), **asdict(found.start)},
         "models": {key: asdict(one) for key, one in found.models.items()},
         "held_out": asdict(found.models[found.model]),
         "logs": {log.where: asdict(one) for log, one in found.held_out},
@@ -118,7 +127,8 @@ def number_rows(found: Choice) -> list[list[str]]:
 
 def error_rows(found: Choice) -> list[list[str]]:
     """Returns the rows of a table of models with ERRORS."""
-    return [[key, *error_texts(one)] for key, one in found.models.items()]
+    rows = {"start": found.start, **found.models}
+    return [[key, *error_texts(one)] for key, one in rows.items()]
 
 
 def error_texts(one: Errors) -> list[str]:
@@ -127,19 +137,22 @@ def error_texts(one: Errors) -> list[str]:
 
 
 def worth(found: Choice, by: str) -> str:
-    """Returns which model is worth it and what it errs by, as a sentence."""
+    """Returns which model is worth it and what it and the start err by, as sentences."""
     error = found.models[found.model]
     compared = "the simplest model within 5 % of the best, and " if len(found.models) > 1 else ""
+    beaten = error.angle < found.start.angle
+    verdict = "." if beaten else ", and no model errs less: keep that servo, or record more logs."
     return (
         f"{found.model} is {compared}fitted to {len(found.held_out)} logs: held out by {by} in "
         f"turn it errs by {error.angle:.2f} degrees, {error.speed:.2f} rad/s and "
-        f"{error.torque:.2f} of the torque."
+        f"{error.torque:.2f} of the torque. The servo that the search began at, "
+        f"{servo_name(found.robot)}, errs by {found.start.angle:.2f} degrees{verdict}"
     )
 
 
 def write_servo(found: Choice, folder: Path, *, command: str, by: str) -> list[Path]:
     """Writes servo.toml, identify.json and run.json; returns the files."""
-    write_text(folder / SERVO, tomlkit.dumps({"servo": servo_table(found, by)}))
+    write_text(folder / SERVO, servo_text(found, by))
     write_json(folder / RESULT, result_table(found))
     logs = [log.where for log, _ in found.held_out]
     write_json(folder / RUN_FILE, {
@@ -148,23 +161,22 @@ def write_servo(found: Choice, folder: Path, *, command: str, by: str) -> list[P
     return [folder / name for name in (SERVO, RESULT, RUN_FILE)]
 
 
-def servo_table(found: Choice, by: str) -> dict[str, Any]:
-    """Returns the [servo] section of a robot file with the servo that was found."""
+def servo_text(found: Choice, by: str) -> str:
+    """Returns a [servo] section of a robot file with the servo that was found, and its source."""
     servo, logs = found.fit.robot.servo, [log for log, _ in found.held_out]
     largest = max(logs, key=lambda log: log.gain)
-    error = found.models[found.model]
-    changed = [key for key in FOUND if getattr(servo, key) != getattr(Servo, key, None)]
-    table = tomlkit.table()
-    table.comment(
-        f"{logs[0].motor}, {found.model}, {datetime.date.today().isoformat()}: fitted to "
-        f"{len(logs)} bench logs; held out by {by} it errs by {error.angle:.2f} degrees, "
-        f"{error.speed:.2f} rad/s; duty_gain is that of a firmware gain of {largest.register:g}"
+    names = ", ".join(Path(log.where).name for log in logs)
+    about = (
+        f"{logs[0].motor}, {datetime.date.today().isoformat()}. {worth(found, by)} duty_gain is "
+        f"that of a firmware gain of {largest.register:g}. Logs: {names}"
     )
-    table["drive"] = "motor"
-    for key in (*GIVEN, *changed):
-        table[key] = getattr(servo, key)
-    table["duty_gain"] = largest.gain
-    return table
+    unused = DERIVED if any(getattr(servo, key) for key in STRIBECK) else (*DERIVED, *CURVE)
+    values = {item.name: getattr(servo, item.name) for item in fields(Servo)
+              if item.name not in unused and getattr(servo, item.name) != item.default}  # fmt: skip
+    rounded = {key: float(f"{one:.7g}") for key, one in values.items()}
+    table = {"drive": "motor", **rounded, "duty_gain": float(f"{largest.gain:.7g}")}
+    lines = textwrap.wrap(about, 98, break_long_words=False, break_on_hyphens=False)
+    return "".join(f"# {line}\n" for line in lines) + tomlkit.dumps({"servo": table})
 
 
 @dataclass(frozen=True)
@@ -173,22 +185,26 @@ class BenchReplay:
 
     bench: Bench  # of the log
     swing: Swing
-    servo: Servo
+    fit: ServoFit  # of the bench: offset and delay
     errors: Errors
+    warnings: Sequence[str] = ()
 
 
 def replayed(path: Path, robot: Robot) -> BenchReplay:
     """Simulates a bench log with the robot's servo; offset and delay of the bench are fitted."""
     log = read_bench_log(path)
     found = fit_servo([log], with_start(robot, [log], preset=True), None, seeds=1)
-    bench, servo = Bench([log]), found.robot.servo
+    bench = Bench([log])
     swing = found.swing(bench)
-    return BenchReplay(bench, swing, servo, log_errors(bench, swing, servo)[0])
+    (errors,) = log_errors(bench, swing, found.robot.servo)
+    return BenchReplay(bench, swing, found, errors, motor_warnings(robot, log.motor))
 
 
 def write_replay(done: BenchReplay, folder: Path, *, command: str) -> list[Path]:
     """Writes the page and run.json of a replayed bench log; returns the files."""
-    log = done.bench.logs[0]
+    log, fit = done.bench.logs[0], done.fit
+    fitted = {row.key: f"{number(fit.values[row.key])} {row.unit}" for row in fit.rows}
+    servo = servo_name(fit.robot)
     page = render(
         "log.html.jinja",
         package="hexapod_cosim.extensions.identify",
@@ -196,18 +212,21 @@ def write_replay(done: BenchReplay, folder: Path, *, command: str) -> list[Path]
         headline=f"{log.motor}, gain {log.register:g}, {log.trajectory}, {log.mass:g} kg at "
         f"{log.length:g} m",
         lead="Mean absolute errors; of the torque the error's share of its root mean square. "
-        f"{' and '.join(row.key for row in BENCH)} were fitted to the log.",
-        warnings=[],
+        f"{' and '.join(fitted)} were fitted to the log.",
+        warnings=done.warnings,
         columns=("log", "", *ERRORS),
         tables={"Errors": [[log.where, "", *error_texts(done.errors)]]},
         pictures={"Angle, speed, duty and motor torque": embedded(drawn(done))},
         command=command,
-        facts={"log": log.where},
+        facts={"log": log.where, "servo": servo, **fitted},
         source=RUN_FILE,
     )
     write_text(folder / REPORT, page)
-    facts = {"kind": "replay", "status": "completed", "log": log.where, "command": command}
-    write_json(folder / RUN_FILE, {**facts, "errors": asdict(done.errors)})
+    write_json(folder / RUN_FILE, {
+        "kind": "replay", "status": "completed", "log": log.where, "command": command,
+        "servo": servo, "bench": fit.values, "errors": asdict(done.errors),
+        "warnings": list(done.warnings),
+    })  # fmt: skip
     return [folder / REPORT, folder / RUN_FILE]
 
 
@@ -216,7 +235,7 @@ def drawn(done: BenchReplay) -> Any:
     from matplotlib import rc_context  # noqa: PLC0415  slow to import
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    log, swing, servo = done.bench.logs[0], done.swing, done.servo
+    log, swing, servo = done.bench.logs[0], done.swing, done.fit.robot.servo
     rows = slice(0, len(log.time))
     angle, speed, duty = (own[rows, 0, 0] for own in (swing.angle, swing.speed, swing.duty))
     constant, gain = servo.torque_constant, torque_per_volt(servo)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.extensions.identify.bench.log import SPEED_DELAY, BenchLog, column
+from hexapod_cosim.extensions.identify.bench.log import SPEED_DELAY, BenchLog, column, figure
 from hexapod_cosim.models.arrays import Array
 
 # duty for each radian of position error and unit of the gain register, as K-Scale measured it
@@ -25,14 +25,18 @@ def read(path: Path, table: Mapping[str, Any]) -> BenchLog:
     entries, load = table["entries"], np.round(100.0 * column(table["entries"], "torque"))
     time, on = column(entries, "timestamp"), column(entries, "torque_enable")
     angle, voltage = column(entries, "position"), column(entries, "input_volts")
+    gain = figure(GAINS, table["motor"], "motor", str(path))
+    rod = table.get("arm_mass")
+    if rod is None:
+        rod = figure(RODS, table["length"], "length", str(path))
     duty = np.where(load >= NEGATIVE, load - NEGATIVE, -load) / UNITS
     return BenchLog(
         where=str(path),
         motor=table["motor"],
-        gain=GAINS[table["motor"]] * table["kp"],
+        gain=gain * table["kp"],
         register=table["kp"],
         mass=float(table["mass"]),
-        rod=table.get("arm_mass", RODS[table["length"]]),
+        rod=rod,
         length=float(table["length"]),
         trajectory=table["trajectory"],
         time=time,
