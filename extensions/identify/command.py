@@ -10,14 +10,7 @@ from typing import Annotated
 import typer
 
 from hexapod_cosim.cosim.cli.options import Json, RobotName, Workers, command_line
-from hexapod_cosim.cosim.cli.terminal import (
-    refuse_unused,
-    show_files,
-    show_json,
-    show_table,
-    show_text,
-    warn,
-)
+from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table, show_text, warn
 from hexapod_cosim.cosim.results.folder import results_folder
 from hexapod_cosim.extensions.identify.bench import is_bench_log
 from hexapod_cosim.extensions.identify.bench.log import GROUPINGS
@@ -75,7 +68,6 @@ Folder = Annotated[
 
 
 def identify(
-    context: typer.Context,
     logs: Logs,
     robot: RobotName = "athena",
     find: Find = None,
@@ -88,8 +80,10 @@ def identify(
 ) -> None:
     """Find a robot's masses, servos, contacts and sensors from its own logs."""
     if str(logs[0]) == SERVO_WORD:
-        unused = {"find": "--find", "held_out": "--held-out"}
-        refuse_unused(context, unused, written="logs of a servo bench", fix="use --hold-out")
+        if find or held_out != HELD_OUT:
+            what = "an option that does nothing for logs of a servo bench"
+            given = "--find" if find else "--held-out"
+            raise HexapodError(what, got=given, expected="none of it", fix="use --hold-out")
         _identify_servo(logs[1:], robot, friction, hold_out, workers, output, json)
         return
     # imported only here because they are slow to import

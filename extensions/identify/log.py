@@ -148,13 +148,9 @@ def read_log(path: Path, *, robot: Robot | None = None) -> Log:
         ".mcap": lambda: read_mcap(path, robot=robot),
     }
     if path.suffix.lower() not in readers:
-        raise LogError(
-            "not a log",
-            got=path.name,
-            expected="a file that ends in " + ", ".join(readers),
-            fix="name the log's file, not its folder" if path.is_dir() else "convert it",
-            where=str(path),
-        )
+        expected = "a file that ends in " + ", ".join(readers)
+        fix = "name the log's file, not its folder" if path.is_dir() else "convert it"
+        raise LogError("not a log", got=path.name, expected=expected, fix=fix, where=str(path))
     if not path.exists():
         raise LogError(
             "no recording of a robot",
@@ -197,43 +193,29 @@ def _check_commands(log: Log) -> None:
     for name, values in log.commands.items():
         known = np.isfinite(values)
         if not known.all():
-            raise LogError(
-                "a command is not a number",
-                got=f"{name} at {log.time[~known][0]:g} s",
-                expected="a number in each row",
-                fix="drop these rows or repeat the command before",
-                where=log.where,
-            )
+            what, expected = "a command is not a number", "a number in each row"
+            got = f"{name} at {log.time[~known][0]:g} s"
+            fix = "drop these rows or repeat the command before"
+            raise LogError(what, got=got, expected=expected, fix=fix, where=log.where)
         if name in COMMANDS and np.abs(values).max() > LARGEST:
-            raise LogError(
-                "a command beyond a turn",
-                got=f"{name} up to {np.abs(values).max():.3g}",
-                expected="an angle in rad",
-                fix="convert degrees where the log is written",
-                where=log.where,
-            )
+            what, expected = "a command beyond a turn", "an angle in rad"
+            got = f"{name} up to {np.abs(values).max():.3g}"
+            fix = "convert degrees where the log is written"
+            raise LogError(what, got=got, expected=expected, fix=fix, where=log.where)
 
 
 def _check_times(time: Array, where: str) -> None:
     steps = np.diff(time)
     if len(time) < LEAST_ROWS:
-        raise LogError(
-            "a log that is too short",
-            got=f"{len(time)} rows",
-            expected=f"{LEAST_ROWS} at least",
-            fix="record a longer one",
-            where=where,
-        )
+        got, expected, fix = f"{len(time)} rows", f"{LEAST_ROWS} at least", "record a longer one"
+        raise LogError("a log that is too short", got=got, expected=expected, fix=fix, where=where)
     bad = ~((steps > 0.0) & (steps <= LONGEST_STEP))
     if bad.any():
         k = int(np.flatnonzero(bad)[0])
-        raise LogError(
-            "times of a log",
-            got=f"{steps[k]:g} s from row {k} to row {k + 1}",
-            expected=f"increasing times in seconds, at most {LONGEST_STEP} s apart",
-            fix="divide milliseconds by 1000, sort the rows, or cut the log at the gap",
-            where=where,
-        )
+        got = f"{steps[k]:g} s from row {k} to row {k + 1}"
+        expected = f"increasing times in seconds, at most {LONGEST_STEP} s apart"
+        fix = "divide milliseconds by 1000, sort the rows, or cut the log at the gap"
+        raise LogError("times of a log", got=got, expected=expected, fix=fix, where=where)
 
 
 def _with_attitude(recording: Recording) -> Recording:

@@ -14,14 +14,7 @@ import numpy as np
 import typer
 
 from hexapod_cosim.cosim.cli.options import FmuFile, Json, RobotName, command_line
-from hexapod_cosim.cosim.cli.terminal import (
-    refuse_unused,
-    show_files,
-    show_json,
-    show_table,
-    waiting,
-    warn,
-)
+from hexapod_cosim.cosim.cli.terminal import show_files, show_json, show_table, waiting, warn
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.common.temporary import TemporaryFolder
 from hexapod_cosim.cosim.export.plant import export_fmu
@@ -48,7 +41,7 @@ from hexapod_cosim.extensions.identify.report import (
 )
 from hexapod_cosim.extensions.identify.screening import BadColumn, left_out, screened
 from hexapod_cosim.extensions.identify.start import initial_state
-from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models import HexapodError, Robot, load_robot
 
 REPLAY, REPORT, KIND = "replay.csv", "report.html", "replay"
 TEMPLATE = "log.html.jinja"
@@ -113,26 +106,17 @@ def replay(log: Log, robot: Robot, *, fmu: Path | None = None) -> Replay:
 def write_replay(done: Replay, robot: Robot, folder: Path, *, command: str) -> list[Path]:
     """Writes replay.csv, the simulated rows, the report and run.json; returns the files."""
     facts = {
-        "kind": KIND,
-        "status": "completed",
-        "log": done.log.where,
+        "kind": KIND, "status": "completed", "log": done.log.where, "command": command,
         "robot": {"name": robot.name, "hash": robot.hash},
-        "command": command,
-        "channels": [asdict(one) for one in done.channels],
-        "warnings": done.warnings,
-    }
+        "channels": [asdict(one) for one in done.channels], "warnings": done.warnings,
+    }  # fmt: skip
     text = io.StringIO()
     writer = csv.DictWriter(text, [one.name for one in fields(Difference)], lineterminator="\n")
     writer.writeheader()
     writer.writerows(asdict(one) for one in done.columns)
     write_text(folder / REPLAY, text.getvalue())
-    (simulated,) = write_recording(
-        done.simulated,
-        folder,
-        RESULTS,
-        formats=default_formats()[:1],
-        about={"log": done.log.where},
-    )
+    about, formats = {"log": done.log.where}, default_formats()[:1]
+    (simulated,) = write_recording(done.simulated, folder, RESULTS, formats=formats, about=about)
     write_text(folder / REPORT, _page(done, robot, command, simulated.name))
     write_json(folder / RUN_FILE, facts)
     return [folder / REPLAY, simulated, folder / REPORT, folder / RUN_FILE]
@@ -174,7 +158,6 @@ Folder = Annotated[
 
 
 def replay_command(
-    context: typer.Context,
     log: LogFile,
     robot: RobotName = "athena",
     fmu: FmuFile = None,
@@ -184,9 +167,9 @@ def replay_command(
     """Drive the plant FMU with a recorded log and compare all readings with it."""
     own = load_robot(robot)
     if is_bench_log(log):
-        refuse_unused(
-            context, {"fmu": "--fmu"}, written="the log of a servo bench", fix="leave it out"
-        )
+        if fmu:
+            what = "an option that does nothing for the log of a servo bench"
+            raise HexapodError(what, got="--fmu", expected="none of it", fix="leave it out")
         _replay_bench(log, own, output, command_line("replay", log, robot=robot), json)
         return
     command = command_line("replay", log, robot=robot, fmu=fmu)

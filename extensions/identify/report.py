@@ -131,13 +131,8 @@ def _draw(log: Log, channel: Channel, names: list[str], simulated: Mapping[str, 
         axis.set_title(name, fontsize=6.5)
         axis.tick_params(labelsize=5.5)
         axis.plot(log.time[thin], measured[thin], color="0.55", label="measured", linewidth=1.4)
-        axis.plot(
-            log.time[thin],
-            simulated[name][thin],
-            color=PALETTE[3],
-            label="simulated",
-            linewidth=0.7,
-        )
+        found = simulated[name][thin]
+        axis.plot(log.time[thin], found, color=PALETTE[3], label="simulated", linewidth=0.7)
     figure.supylabel(f"[{channel.unit}]", fontsize=7.0)
     figure.supxlabel("time [s]", fontsize=7.0)
     handles, labels = axes[0, 0].get_legend_handles_labels()

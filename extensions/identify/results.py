@@ -34,13 +34,8 @@ def write_identified(found: Identified, file: str, folder: Path, *, command: str
     write_robot(found, file, folder / ROBOT_FILE, logs)
     write_text(folder / SENSORS, tomlkit.dumps(dict(sensors_table(found))))
     write_json(folder / RESULT, result_table(found))
-    facts = {
-        "kind": KIND,
-        "status": "completed",
-        "logs": logs,
-        "robot": {"name": found.file.name, "hash": found.file.hash},
-        "command": command,
-    }
+    robot = {"name": found.file.name, "hash": found.file.hash}
+    facts = {"kind": KIND, "status": "completed", "logs": logs, "robot": robot, "command": command}
     write_json(folder / RUN_FILE, facts)
     return [folder / name for name in (ROBOT_FILE, SENSORS, RESULT, RUN_FILE)]
 
@@ -94,33 +89,21 @@ def error_rows(found: Identified) -> list[list[str]]:
     if not misfit:
         part, misfit = "fitted", found.fit.misfit
     return [
-        [
-            TITLES[one.channel],
-            one.unit,
-            number(one.rms),
-            number(other.rms),
-            f"{one.rms / other.rms:.1f}" if other.rms > 0.0 else "",
-            number(found.fit.noise[one.channel]),
-            f"{misfit[one.channel].value:.2f}",
-        ]
+        [TITLES[one.channel], one.unit, number(one.rms), number(other.rms),
+         f"{one.rms / other.rms:.1f}" if other.rms > 0.0 else "",
+         number(found.fit.noise[one.channel]), f"{misfit[one.channel].value:.2f}"]
         for one, other in found.differences(part)
-    ]
+    ]  # fmt: skip
 
 
 def estimate_rows(estimates: Sequence[Estimate]) -> tuple[list[list[str]], int]:
     """Returns the rows of a table with ESTIMATES, and how many biases that may be 0 it lacks."""
     shown = [
-        [
-            one.key,
-            one.unit,
-            number(one.before),
-            one.found,
-            one.interval,
-            "yes" if one.determined else "no",
-        ]
+        [one.key, one.unit, number(one.before), one.found, one.interval,
+         "yes" if one.determined else "no"]
         for one in estimates
         if not (one.key.startswith(BIAS) and one.low <= 0.0 <= one.high and one.determined)
-    ]
+    ]  # fmt: skip
     return shown, len(estimates) - len(shown)
 
 

@@ -20,6 +20,7 @@ from test_laws_servo import tibias
 from test_pendulum import bench as robot_on_wall
 
 from hexapod_cosim.extensions.identify.bench import read_bench_log
+from hexapod_cosim.extensions.identify.bench.command import motor_warnings
 from hexapod_cosim.extensions.identify.bench.errors import Errors, judged
 from hexapod_cosim.extensions.identify.bench.fit import NOISE, ServoFit, fit_servo
 from hexapod_cosim.extensions.identify.bench.log import BenchLog
@@ -146,7 +147,7 @@ ENTRY = {"timestamp": 1.0, "goal_position": 0.5, "position": 0.4, "speed": 0.1, 
 def test_both_kinds_of_logs_are_read(tmp_path: Path) -> None:
     """Speeds are late by 20 ms; readings of 0 of K-Scale's failed."""
     head = {"mass": 0.5, "length": 0.15, "kp": 32, "trajectory": "sin_sin"}
-    rows = [{**ENTRY, "timestamp": 1.0 + 0.01 * k, "speed": 0.1 * k} for k in range(5)]
+    rows = [{**ENTRY, "timestamp": 1.0 + 0.01 * k, "speed": 0.1 * k} for k in range(12)]
     bam = {**head, "motor": "xl330", "entries": [{**one, "load": 65447} for one in rows]}
     own = [{**one, "torque": 10.54} for one in rows]
     own[1]["position"], own[2]["torque"], own[3]["input_volts"] = -3.14005, 0.0, 0.0
@@ -193,16 +194,81 @@ def test_a_file_that_is_no_bench_log_is_refused(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_replayed_bench_log_is_drawn_beside_its_simulation(call: Call, tmp_path: Path) -> None:
+HEAD = {"mass": 0.5, "length": 0.1, "kp": 200, "trajectory": "ramp", "motor": "xl330"}
+
+
+def written_log(path: Path, *, rows: int = 40, row: int = 0, **more: Any) -> Path:
+    """Writes the log of a ramp; keys of entries are changed in one row, others in the head."""
     entries = [
-        {**ENTRY, "timestamp": 0.02 * k, "goal_position": 0.01 * k, "position": 0.01 * k, "load": 0}
-        for k in range(40)
-    ]
-    table = {"mass": 0.5, "length": 0.1, "kp": 200, "trajectory": "ramp", "motor": "xl330"}
-    (tmp_path / "x.json").write_text(json.dumps({**table, "entries": entries}), encoding="utf-8")
-    call("replay", tmp_path / "x.json", "-o", tmp_path / "out")
-    assert "data:image/svg+xml" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+        {**ENTRY, "timestamp": 0.02 * k, "goal_position": 0.01 * k, "position": 0.01 * k,
+         "load": 0, "torque": 1.0}
+        for k in range(rows)
+    ]  # fmt: skip
+    entries[row] |= {key: more.pop(key) for key in tuple(more) if key in entries[row]}
+    path.write_text(json.dumps({**HEAD, **more, "entries": entries}), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("changed", "parts"),
+    [
+        ({"motor": "mx64"}, ["an unknown motor", "got 'mx64'", "expected xl330"]),
+        ({"motor": "sts3032", "actuator_id": 1}, ["got 'sts3032'", "expected sts3215, sts3250"]),
+        (
+            {"motor": "sts3250", "actuator_id": 1, "length": 0.2},
+            ["an unknown length", "got 0.2", "expected 0.1, 0.15"],
+        ),
+        ({"mass": 0.0}, ["unusable mass", "got 0.0", "expected a number > 0"]),
+        ({"length": -0.1}, ["unusable length", "got -0.1", "expected a number > 0"]),
+        ({"kp": 0}, ["unusable kp", "got 0", "expected a number > 0"]),
+        ({"rows": 9}, ["unusable entries", "got 9", "expected at least 10"]),
+        ({"row": 7, "position": np.nan}, ["unusable angle", "nan in row 8", "finite numbers"]),
+        ({"row": 7, "timestamp": 0.12}, ["unusable time", "0.1186, 0.1186 in rows 7, 8", "rise"]),
+    ],
+)
+def test_a_bench_log_that_cannot_be_simulated_is_refused(
+    call: Call, tmp_path: Path, changed: Any, parts: list[str]
+) -> None:
+    path = written_log(tmp_path / "x.json", **changed)
+    assert_refused(call("replay", path, "-o", tmp_path / "out"), *parts, "x.json: ")
+
+
+def test_words_that_do_not_fit_bench_logs_are_refused(call: Call, tmp_path: Path) -> None:
+    own = written_log(tmp_path / "x.json")
+    other = written_log(tmp_path / "y.json", motor="sts3250", actuator_id=1)
+    servo = ("identify", "servo", own)
+    assert_refused(call(*servo, other), "several motors", "sts3250, xl330", "its own logs")
+    assert_refused(call(*servo, "--find", "mass"), "does nothing", "--find", "use --hold-out")
+    assert_refused(call(*servo, "--held-out", "0.5"), "does nothing", "got '--held-out'")
+    assert_refused(call("replay", own, "--fmu", "x.fmu"), "does nothing", "--fmu", "leave it out")
+    assert_refused(call("identify", own), f"hexapod identify servo {own}")
+    assert_refused(call(*servo, own), "gain 200 in each log", "name further logs")
+    longer = written_log(tmp_path / "z.json", length=0.15)
+    assert_refused(call(*servo, longer), "differ in their gain", "give --hold-out length")
     assert_refused(call("identify", "servo", "-o", tmp_path / "none"), "no bench logs", "JSON")
+
+
+def test_a_replayed_bench_log_is_drawn_beside_its_simulation(call: Call, tmp_path: Path) -> None:
+    path = written_log(tmp_path / "x.json")
+    call("replay", path, "-o", tmp_path / "out")
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "data:image/svg+xml" in page
+    assert "<dd>xl330_fitted</dd>" in page
+    facts = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))
+    assert (facts["servo"], list(facts["bench"])) == (
+        "xl330_fitted", ["bench.offset", "bench.delay"],
+    )  # fmt: skip
+    assert facts["warnings"] == []
+
+
+def test_a_servo_of_another_motor_than_the_log_is_warned_of() -> None:
+    athena = load_robot("athena")
+    robot = replace(athena, servo=measured_servo("mx64_m4").servo)
+    assert motor_warnings(athena, "xl330") == []
+    assert motor_warnings(robot, "mx64") == []
+    assert motor_warnings(robot, "xl330") == [
+        "the log is of a xl330, but the servo of robot athena is mx64_m4."
+    ]
 
 
 ROOT = Path(__file__).parents[2]

@@ -5,6 +5,7 @@ friction model is warned of.
 from __future__ import annotations
 
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,8 +13,16 @@ import numpy as np
 import pytest
 import tomlkit
 from secret_robots import SEEN, Secret, secret_robot
+from test_bench import made_log
 
 from hexapod_cosim.cosim.export.plant import export_fmu
+from hexapod_cosim.extensions.identify.bench.choice import choose
+from hexapod_cosim.extensions.identify.bench.command import (
+    error_rows,
+    result_table,
+    servo_text,
+    worth,
+)
 from hexapod_cosim.extensions.identify.fitting.problem import Problem
 from hexapod_cosim.extensions.identify.identification import Identified, identify, make_experiment
 from hexapod_cosim.extensions.identify.numbers.servo import TERMS, with_friction_model
@@ -24,7 +33,7 @@ from hexapod_cosim.extensions.identify.unknowns import ROBOT, chosen_unknowns
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.robot import robot_path
 from hexapod_cosim.models.servos.motor import back_emf_damping
-from hexapod_cosim.models.servos.presets import measured_servo
+from hexapod_cosim.models.servos.presets import measured_servo, servo_table
 
 GROUPS = ("servo",)
 MOTOR = ("servo.torque_constant", "servo.resistance")
@@ -156,3 +165,28 @@ def test_the_terms_of_a_model_are_those_of_equation_50() -> None:
     row = next(row for row in rows["m3"] if row.key == "servo.load_friction")
     servo = row.write(variants["m3"], 0.3).servo
     assert (servo.motor_load_friction, servo.external_load_friction) == (0.3, 0.3)
+
+
+def test_a_start_that_no_model_beats_is_said_to_be_better() -> None:
+    """The start made the logs, and friction alone is fitted to few noisy rows."""
+    time = 0.005 * np.arange(200)
+    true = replace(measured_servo("xl330_m4").servo, current_max=0.9)
+    logs = [made_log(true, np.sin(3.0 * time), gain=gain) for gain in (0.6, 2.4)]
+    robot = replace(load_robot("athena"), servo=true)
+    with ThreadPoolExecutor(1) as pool:
+        found = choose(logs, robot, pool, models=["m1"])
+    assert found.start.angle < 0.01 < found.models["m1"].angle
+    assert [row[0] for row in error_rows(found)] == ["start", "m1"]
+    assert result_table(found)["start"]["servo"] == "xl330_m4"
+    assert "xl330_m4, errs by 0.00 degrees, and no model errs less: keep" in worth(found, "gain")
+    text = servo_text(found, "gain")
+    table = tomllib.loads(text)["servo"]
+    assert text.startswith("# xl330, ")
+    assert "Logs: made, made" in text
+    assert not [key for key in table if "stribeck" in key]
+    assert table["duty_gain"] == 2.4
+    digits = [len(f"{one!r}".partition("e")[0].replace(".", "").lstrip("0")) for one in
+              table.values() if isinstance(one, float)]  # fmt: skip
+    assert max(digits) == 7
+    kept = servo_table(table, "servo")
+    assert kept["torque_constant"] == pytest.approx(found.fit.robot.servo.torque_constant, rel=1e-6)

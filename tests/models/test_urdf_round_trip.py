@@ -13,6 +13,7 @@ import pytest
 from disguised_urdf import differences, disguised, random_robot, stances
 from foreign_urdf import SIDE, spider, spider_urdf
 
+from hexapod_cosim.cosim.cli.catalogue import servos
 from hexapod_cosim.models import BodyContact, RobotError, check_robot, list_robots, load_robot
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
@@ -37,6 +38,15 @@ def test_a_bundled_robot_comes_back_to_the_last_bit(name: str, tmp_path: Path) -
     again = load_robot(written(robot_to_urdf(robot), tmp_path))
     assert again == robot
     assert again.hash == robot.hash
+
+
+def test_the_effort_of_a_joint_is_the_torque_that_the_servo_can_give() -> None:
+    """The STS3215's firmware allows 1.59315 A, 3.32 N m of a stall torque of 7.50 N m."""
+    root = ET.fromstring(robot_to_urdf(load_robot("sts3215_hexapod")))
+    efforts = {float(one.attrib["effort"]) for one in root.iter("limit")}
+    assert list(efforts) == pytest.approx([3.31633], rel=1e-5)
+    (own,) = [one for one in servos() if one["name"] == "sts3215_12v"]
+    assert own["stall"] == pytest.approx(3.31633, rel=1e-5)
 
 
 @pytest.mark.parametrize("pattern", [True, False], ids=["controller's axes", "any axes"])

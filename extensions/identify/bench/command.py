@@ -183,7 +183,7 @@ def servo_text(found: Choice, by: str) -> str:
 class BenchReplay:
     """A bench log and the simulation of it."""
 
-    bench: Bench  # of the log
+    bench: Bench
     swing: Swing
     fit: ServoFit  # of the bench: offset and delay
     errors: Errors
