@@ -3,9 +3,8 @@ of docs/reality.md.
 
 usage: python -m benchmarks.identify.hip
 
-The real robot lay on its belly and moved one leg in the air. Its hip went in four steps of 1 s,
-each with a dwell of 3.1 s, to 42.955, 47.133, 51.143 and 47.133 degrees above the horizon; the last
-1.0 s of the two dwells at 47.133 degrees is compared.
+The real robot lay on its belly and moved one leg in the air. Its hip dwelt 3.1 s at 42.955, 47.133,
+51.143 and again 47.133 degrees above the horizon; the last 1.0 s at 47.133 degrees is compared.
 """
 
 from __future__ import annotations
@@ -24,16 +23,14 @@ from hexapod_cosim.models.servos.motor import position_gain
 from hexapod_cosim.models.servos.presets import measured_servo
 
 # github.com/lukas/hexapod e76fa13, artifacts/l2_belly_rest_hysteresis_d4908236/
-# l2_hysteresis_loop_table.txt: means of its six repetitions
-REAL_LOOP = 0.5021  # deg  angle after the step down less that after the step up
-REAL_ERRORS = (0.4377, -0.0644)  # deg  below the goal, after the steps up and down
-REAL_DUTY = 4.41  # %  after the step up; after the one down the load is of another joint
+# l2_hysteresis_loop_table.txt: means of its six repetitions, as the last four of `loops`
+REAL = (0.5021, 0.4377, -0.0644, 4.41)
 VOLTAGE = 11.25  # V  of the robot; a servo for less gets its own voltage
 LOW, MIDDLE, HIGH = (math.radians(angle) for angle in (42.955, 47.133, 51.143))
 MOVE, DWELL, WINDOW = 0.9, 3.1, 1.0  # s
 SLOW = 0.02  # rad/s  of the goal that does not stop
 ROW = 0.05  # s
-LEG = 0.0118, 0.091  # kg m, m  of models/sts3215_hexapod.toml, straight: mass times distance, size
+LEG = 0.0118, 0.091  # kg m, m  straight, of models/sts3215_hexapod.toml; length of its inertia
 SHARES = (0.5, 1.0, 2.0)  # of the leg's weight
 
 
@@ -42,15 +39,18 @@ def steps() -> tuple[Array, Array]:
     stages = [(LOW, LOW), (LOW, MIDDLE), (MIDDLE, HIGH), (HIGH, MIDDLE)]
     local = np.arange(0.0, MOVE + DWELL - 0.5 * ROW, ROW)
     share = 0.5 - 0.5 * np.cos(np.pi * np.minimum(local / MOVE, 1.0))
-    goal = np.concatenate([start + (end - start) * share for start, end in stages])
-    return ROW * np.arange(len(goal)), goal
+    return with_times(np.concatenate([start + (end - start) * share for start, end in stages]))
 
 
 def slow() -> tuple[Array, Array]:
     """Returns times [s] and goals [rad above the horizon] of a slow motion up and down."""
     up = np.arange(LOW, HIGH, SLOW * ROW)
-    goal = np.concatenate([up, up[::-1]])
-    return ROW * np.arange(len(goal)), goal
+    return with_times(np.concatenate([up, up[::-1]]))
+
+
+def with_times(goal: Array) -> tuple[Array, Array]:
+    """Returns the times [s] of goals, and these."""
+    return np.asarray(ROW * np.arange(len(goal)), dtype=float), goal
 
 
 def log(servo: Servo, share: float, course: tuple[Array, Array]) -> BenchLog:
@@ -87,8 +87,7 @@ def loops(servo: Servo, shares: Sequence[float]) -> Array:
 
 def real_row() -> str:
     """Returns the row of the real hip."""
-    up, down = REAL_ERRORS
-    return f"| real hip | 1 | | {REAL_LOOP:.2f} | {up:.2f} | {down:.2f} | {REAL_DUTY:.1f} |"
+    return "| real hip | 1 | | {:.2f} | {:.2f} | {:.2f} | {:.1f} |".format(*REAL)
 
 
 def rows(name: str, servo: Servo) -> Iterator[str]:
