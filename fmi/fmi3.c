@@ -106,7 +106,12 @@ fmi3Instance fmi3InstantiateCoSimulation(
     instance->base.may_return_early = earlyReturnAllowed;
     instance->intermediate = hx_continuous ? intermediateUpdate : NULL;
   }
-  return open_instance(instance, instantiationToken, resourcePath);
+  if (!open_instance(instance, instantiationToken, resourcePath)) return NULL;
+  /* steps save here and allocate nothing */
+  if (!instance->intermediate || hx_instance_save(&instance->base, &instance->before) == HX_OK)
+    return instance;
+  fmi3FreeInstance(instance);
+  return NULL;
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(

@@ -1,1 +1,1 @@
-"""Files, events and the locations of the installed FMUs. Imports no other room."""
+"""Files and the locations of the installed FMUs. Imports no other room."""

@@ -8,6 +8,7 @@ import hashlib
 import platform
 import sys
 import tomllib
+from collections.abc import Mapping
 from functools import cache
 from importlib import metadata, util
 from pathlib import Path
@@ -202,7 +203,8 @@ def binary(fmi_platform: str, component: Component = PLANT) -> Path:
             fix=BUILD,
         )
     newest = max(found, key=lambda path: path.stat().st_mtime)
-    _refuse_stale(newest, component)
+    table = {"interface.toml": interface_file(component)}
+    _refuse_stale(newest, f"the {component.name} binary", source_files(component) | table)
     return newest
 
 
@@ -220,12 +222,21 @@ def released_binary(fmi_platform: str, identifier: str) -> bytes | None:
 
 def shared_library(name: str) -> Path:
     """Returns the newest installed shared library of this package, such as the co-simulation
-    loop. Raises FmuError when there is none.
+    loop. Raises FmuError when there is none or it is older than its sources.
     """
     found = [path for folder in plant_folders() for path in (folder / "lib").glob(f"{name}.[sd]*")]
     if not found:
         raise FmuError("a library is missing", got=f"no {name}", expected="a built one", fix=BUILD)
-    return max(found, key=lambda path: path.stat().st_mtime)
+    newest = max(found, key=lambda path: path.stat().st_mtime)
+    _refuse_stale(newest, f"the library {name}", _loop_sources(name))
+    return newest
+
+
+def _loop_sources(name: str) -> dict[str, Path]:
+    """Returns the sources of a library with the co-simulation loop, which extensions' contain."""
+    added = (_COSIM.parent / "extensions").glob("*/loop")
+    folders = [_COSIM / "master", *(path for path in added if name.endswith(path.parent.name))]
+    return {key: path for one in folders for key, path in _sources_in(one.name, one).items()}
 
 
 def installed_platforms() -> list[str]:
@@ -249,19 +260,18 @@ def _modification_time(path: Path) -> int:
     return int(path.stat().st_mtime)
 
 
-def _refuse_stale(path: Path, component: Component) -> None:
+def _refuse_stale(path: Path, what: str, sources: Mapping[str, Path]) -> None:
     """Raises FmuError when sources of the source tree are newer than the binary."""
     if not in_source_tree():
         return
-    table = {"interface.toml": _COSIM.parent / component.tree / "interface.toml"}
     changed = [
         name
-        for name, source in (source_files(component) | table).items()
+        for name, source in sources.items()
         if _modification_time(source) > _modification_time(path)
     ]
     if changed:
         raise FmuError(
-            f"the {component.name} binary is older than its sources",
+            f"{what} is older than its sources",
             got=", ".join(changed),
             expected="none changed",
             fix=BUILD,

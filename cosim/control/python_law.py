@@ -167,7 +167,9 @@ class PythonLaw:
         if not isinstance(result, JointCommand):
             raise self._error(
                 "step returns no joint command",
-                got=type(result).__name__,
+                got=f"an array {result.shape}"
+                if isinstance(result, np.ndarray)
+                else type(result).__name__,
                 expected="a JointCommand, or joint angles (6, 3) in rad",
             )
         for name in REFERENCES:

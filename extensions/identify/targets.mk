@@ -13,3 +13,4 @@ identify-campaign: setup
 # KSCALE=FOLDER: the raw logs of kscalelabs/sysid
 bench-servos: setup
 	$(BIN)/python -m benchmarks.identify.servos $(if $(KSCALE),--kscale $(KSCALE)) --pictures docs/images -o benchmarks/results/servos.csv
+	$(BIN)/python -m benchmarks.identify.hip

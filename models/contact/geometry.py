@@ -170,7 +170,7 @@ SINGULAR = 1e-9  # 1  least determinant of a G whose contacts count as different
 
 
 def overlap(first: Array, second: Array, reach: float) -> float:
-    """Returns G_ij of two unit normals (3,).
+    """Returns G_ij of two unit normals (3,) (eq. 59).
 
     reach: 1/rho^2, or 0 where rho is infinite.
     """
@@ -182,22 +182,7 @@ def overlap(first: Array, second: Array, reach: float) -> float:
 
 
 def contact_shares(depth: Array, normal: Array, radius: float) -> Array:
-    """Returns the shares (n,) of contacts of one sphere, 0 to 1.
-
-    Two contacts act independently if they are far apart, such as a floor and a wall. Where they
-    come close, as at a step that is lower than the foot is deep, the sum of both forces would carry
-    the foot twice. The share w_i, by which a force is multiplied, follows from the depths delta_i
-    and the normals n_i of all contacts of the sphere:
-
-        G_ij = (n_i . n_j) phi(|n_i - n_j|/rho),  phi(r) = (1 - r)^4 (4 r + 1) for r < 1, else 0,
-        rho^2 = 25 delta/(R - 2 delta) with the largest depth,
-        lambda >= 0,  s = G lambda - delta >= 0,  lambda_i s_i = 0,  w_i = lambda_i/delta_i.
-
-    G is positive definite for different normals, so that lambda is unique and continuous. A contact
-    whose nearest point lies behind the tangent plane of a deeper one has the share 0 if no depth is
-    larger than R/2, so that the force is continuous. phi is Wendland's function with compact
-    support (Advances in Computational Mathematics 4, 1995). plant_fmu/src/ground/sharing.h is the
-    fast form.
+    """Returns the shares w (n,) of contacts of one sphere, 0 to 1 (eq. 59).
 
     Args:
         depth: (n,) m, > 0.

@@ -125,7 +125,7 @@ def test_joint_angles_alone_are_a_command() -> None:
     ("result", "message"),
     [
         (None, "step returns no joint command: got 'NoneType'"),
-        (np.zeros(18), "step returns no joint command: got 'ndarray'"),
+        (np.zeros(18), "step returns no joint command: got 'an array (18,)'"),
         (JointCommand(speed_ref=np.zeros(18)), "speed_ref has a wrong shape: got (18,)"),
     ],
 )

@@ -282,6 +282,25 @@ def test_a_binary_is_stale_a_second_before_its_newest_source(
         assert plant_files.binary(plant_files.fmi2_platform()) == library
 
 
+@pytest.mark.parametrize("name", ["hexapod_master", "hexapod_gym"])
+def test_a_loop_s_library_is_stale_a_second_before_its_newest_source(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    sources = [*(ROOT / "cosim" / "master").rglob("*.[ch]")]
+    if name == "hexapod_gym":
+        sources += (ROOT / "extensions" / "gym" / "loop").rglob("*.[ch]")
+    newest = int(max(path.stat().st_mtime for path in sources))
+    library = tmp_path / "lib" / f"{name}.so"
+    library.parent.mkdir()
+    library.write_bytes(b"")
+    monkeypatch.setattr(plant_files, "plant_folders", lambda: [tmp_path])
+    os.utime(library, (newest, newest))
+    assert plant_files.shared_library(name) == library
+    os.utime(library, (newest - 1, newest - 1))
+    with pytest.raises(HexapodError, match=f"the library {name} is older than its sources"):
+        plant_files.shared_library(name)
+
+
 def test_fmpy_builds_an_fmu_of_sources_alone_into_a_binary_of_the_same_results(
     athena_fmu: Path, tmp_path: Path
 ) -> None:

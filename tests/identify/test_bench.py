@@ -19,6 +19,7 @@ from plant import Plant
 from test_laws_servo import tibias
 from test_pendulum import bench as robot_on_wall
 
+from benchmarks.identify.hip import real_row, rows
 from hexapod_cosim.extensions.identify.bench import read_bench_log
 from hexapod_cosim.extensions.identify.bench.command import motor_warnings
 from hexapod_cosim.extensions.identify.bench.errors import Errors, judged
@@ -283,3 +284,10 @@ def test_the_page_has_the_rows_that_the_benchmark_wrote() -> None:
     rows_of_page = [line for line in page if line.startswith("| ")]
     assert rows_of_page[1 : len(written) + 1] == written
     assert len(written) > 20
+
+
+def test_the_page_has_the_hysteresis_that_its_script_measures() -> None:
+    page = (ROOT / "docs" / "reality.md").read_text(encoding="utf-8").splitlines()
+    written = [real_row(), *rows("sts3215_12v", measured_servo("sts3215_12v").servo)]
+    start = page.index("| real hip | 1 | | 0.50 | 0.44 | -0.06 | 4.4 |")
+    assert page[start : start + 4] == written

@@ -148,6 +148,14 @@ static void derive_three(fmi3Instance fmu) {
             fmi3OK);
 }
 
+static void update(fmi3InstanceEnvironment environment, fmi3Float64 time, fmi3Boolean set_requested,
+                   fmi3Boolean get_allowed, fmi3Boolean finished, fmi3Boolean can_return,
+                   fmi3Boolean *requested, fmi3Float64 *early) {
+  (void)environment, (void)set_requested, (void)get_allowed, (void)finished, (void)can_return;
+  *requested = fmi3False;
+  *early = time;
+}
+
 static void walk_three(long n) {
   fmi3Boolean event, terminate, early;
   fmi3Float64 last;
@@ -156,7 +164,7 @@ static void walk_three(long n) {
   arm(n);
   fmi3Instance fmu =
       fmi3InstantiateCoSimulation("robot", guid, resources, fmi3False, fmi3False, fmi3False,
-                                  fmi3False, NULL, 0, NULL, log_three, NULL);
+                                  fmi3False, NULL, 0, NULL, log_three, update);
   if (!fmu) CHECK(n > 0 && allocations >= n);
   if (fmu) {
     CHECK(fmi3EnterInitializationMode(fmu, fmi3False, 0.0, 0.0, fmi3False, 0.0) == fmi3OK);

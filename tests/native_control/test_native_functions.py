@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import ctypes as ct
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from gains import PERIOD, make_gains
 
-from hexapod_cosim.controller import LegSolver, make_gait
+from hexapod_cosim.controller import JointCommand, LegSolver, make_gait
 from hexapod_cosim.controller.comply.support import Support
+from hexapod_cosim.controller.sense.health import Health
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.models import load_robot
 
@@ -53,6 +56,35 @@ def test_shares_are_the_same_down_to_no_load_or_feet_that_stand_together(
         np.testing.assert_allclose(
             found / scale, expected / scale, atol=1e-9
         )  # the system's condition number is at most 1e6
+
+
+@pytest.mark.parametrize("extra", [0.0, 0.5, -0.5])
+def test_the_torque_of_a_servo_that_moves_against_its_drag_is_explained(
+    controller_core: ct.CDLL, extra: float
+) -> None:
+    """At 2 rad/s a stiffness of 10 N m/rad with 0.1 rad of error and a drag of 0.2 N m s/rad give
+    0.6 N m. Of a larger load the rest is unexplained; of a smaller one what damping leaves, which
+    may be up to 0.4 N m.
+    """
+    speed, load = 2.0, 0.6 + extra
+    expected = {0.0: 0.0, 0.5: -0.5, -0.5: 0.1}[extra]
+    found = np.empty(1)
+    model = np.array([10.0, 0.2, 0.0, 4.0, PERIOD])
+    joint = np.array([100.0, speed, speed, speed, 0.1, 0.0, load, load])
+    controller_core.hx_probe_unexplained(*pointers(model, joint, found))
+    assert 4.0 * found[0] == pytest.approx(expected, abs=1e-14)
+    legs: Any = SimpleNamespace(speed_max=100.0, load_torques=lambda _angle, _force: every(load))
+    health = Health(load_robot("athena"), None, legs=legs, period=PERIOD)
+    health.stiffness, health.drag, health.rotor, health.most = 10.0, 0.2, 0.0, 4.0
+    health.angle, health.speed = every(-speed * PERIOD), every(speed)
+    command = JointCommand(angle_ref=every(0.1 - speed * PERIOD), speed_ref=every(speed))
+    twin = health._unexplained(every(0.0), np.zeros((6, 3)), command, np.zeros(6, dtype=np.bool_))
+    assert twin == pytest.approx(every(expected), abs=1e-14)
+
+
+def every(value: float) -> np.ndarray:
+    """Returns the value for each joint."""
+    return np.full((6, 3), value)
 
 
 def transcendental(core: ct.CDLL, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -200,6 +200,20 @@ def test_a_drive_told_its_acceleration_stays_on_its_parabola(
     assert plant.output().angle - robot.stance == pytest.approx(0.024 * way, abs=1e-9)
 
 
+def test_a_drive_whose_acceleration_grows_is_on_its_cubic(core: ct.CDLL) -> None:
+    """With 1500 rad/s3 from rest a drive is at 2 mrad with 0.3 rad/s after 20 ms, also if its
+    reference follows the cubic at 100/s.
+    """
+    way = ACCELERATION / 30.0
+    robot = in_flight(alpha=100.0, beta=100.0)
+    plant, nothing = Plant(core, robot), np.zeros((6, 3))
+    growth = Command(angle_ref=nothing, acceleration_ref=50.0 * ACCELERATION)
+    plant.step_ramp(0.02, Command(angle_ref=robot.stance), growth)
+    output = plant.output()
+    assert output.angle - robot.stance == pytest.approx(0.002 * way, abs=1e-8)
+    assert output.speed == pytest.approx(0.3 * way, abs=1e-6)
+
+
 def test_a_drive_told_no_acceleration_lags_by_the_acceleration_over_beta_squared(
     core: ct.CDLL,
 ) -> None:

@@ -1,5 +1,6 @@
-/* sharing.h - shares of the faces, edges and corners of blocks that carry the same part of a foot;
- * models/contact/geometry.py is the readable form. For numbers with and without a derivative.
+/* sharing.h - shares of the faces, edges and corners of blocks that carry the same part of a foot
+ * (eq. 59); models/contact/geometry.py is the readable form. For numbers with and without a
+ * derivative.
  */
 #ifndef HX_SHARING_H
 #define HX_SHARING_H
@@ -18,7 +19,7 @@ typedef struct {
 
 static inline hxNumber number_root(hxNumber x) { return hx_lane(hx_sqrt(hx_splat(x)), 0); }
 
-/* Returns G_ij = (n_i . n_j) phi(|n_i - n_j|/rho); reach: 1/rho^2. */
+/* Returns G_ij = (n_i . n_j) phi(|n_i - n_j|/rho) (eq. 59); reach: 1/rho^2. */
 static inline hxNumber overlap(const hxNumber a[3], const hxNumber b[3], hxNumber reach) {
   hxNumber square = 0.0;
   for (int i = 0; i < 3; ++i) square += (a[i] - b[i]) * (a[i] - b[i]);
@@ -94,8 +95,8 @@ static inline void share_between_two(const hxNumber depth[2], hxNumber G, hxNumb
   share[1] = carry ? second / depth[1] : (hxNumber)(deeper ? 1.0 : 0.0);
 }
 
-/* Computes the shares of contacts: of all choices that only push, that with the largest lambda .
- * delta is the solution. */
+/* Computes the shares w of contacts (eq. 59): of all choices that only push, that with the largest
+ * lambda . delta is the solution. */
 static inline void hx_contact_shares(const hxSharers *of, double radius,
                                      hxNumber share[HX_SHARERS]) {
   hxNumber G[HX_SHARERS][HX_SHARERS];

@@ -59,11 +59,6 @@ static hxNumber hx_kinetic_energy(const hxModel *model, const hxPlantMotion *mot
   return hx_lane(torso + hx_sum_legs(legs), 0);
 }
 
-/* Returns the elastic energy 2/5 K delta^(5/2) of a row of contacts, J. */
-static hxReal elastic_energy(const hxContactWork *contact) {
-  return 0.4 * contact->normal.elastic * hx_max(contact->kin.delta, hx_splat(0.0));
-}
-
 /* Returns the energy that a row of contacts with the ground gives back, J. */
 static hxReal ground_energy(const hxModel *model, int row, const hxContactWork *contact) {
   return has_soil(model, row) ? contact->stored : elastic_energy(contact);

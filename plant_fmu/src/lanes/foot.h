@@ -101,10 +101,14 @@ static inline hxVec3 select3(hxMask mask, hxVec3 a, hxVec3 b) {
   return (hxVec3){hx_select(mask, a.x, b.x), hx_select(mask, a.y, b.y), hx_select(mask, a.z, b.z)};
 }
 
+/* Returns the elastic energy 2/5 K delta^(5/2) of a row of contacts, J. */
+static inline hxReal elastic_energy(const hxContactWork *contact) {
+  return 0.4 * contact->normal.elastic * hx_max(contact->kin.delta, hx_splat(0.0));
+}
+
 /* Replaces the normal force of a row by that of soil where it touched down on it. */
 HX_INLINE void replace_load(hxMask soft, const hxSoilPack *f, hxContactWork *contact) {
-  contact->stored = hx_select(
-      soft, f->stored, 0.4 * contact->normal.elastic * hx_max(contact->kin.delta, hx_splat(0.0)));
+  contact->stored = hx_select(soft, f->stored, elastic_energy(contact));
   contact->normal.force = hx_select(soft, f->force, contact->normal.force);
   contact->normal.elastic = hx_select(soft, f->storage, contact->normal.elastic);
 }

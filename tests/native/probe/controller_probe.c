@@ -2,11 +2,26 @@
 #include <string.h>
 
 #include "comply/support.h"
+#include "sense/health.h"
 #include "transcendental.h"
 
 HX_API void hx_probe_transcendental(const double *x, const double *y, double *result[6], int n);
 HX_API void hx_probe_shares(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS],
                             const double asked[6], double force[HX_LEGS][3]);
+
+HX_API void hx_probe_unexplained(const double model[5], const double joint[8], double *share);
+
+/* Computes the share of the largest torque that nothing explains. model: stiffness, drag, rotor,
+ * largest torque, period; joint: the arguments of `unexplained`. */
+void hx_probe_unexplained(const double model[5], const double joint[8], double *share) {
+  const hxHealthModel m = {.stiffness = model[0],
+                           .drag = model[1],
+                           .rotor = model[2],
+                           .most = model[3],
+                           .period = model[4]};
+  *share = unexplained(&m, joint[0], joint[1], joint[2], joint[3], joint[4], joint[5], joint[6],
+                       joint[7]);
+}
 
 /* Computes sine, cosine, e^x - 1, tanh x and x^(2/3), and the angle of (y, x). */
 void hx_probe_transcendental(const double *x, const double *y, double *result[6], int n) {
