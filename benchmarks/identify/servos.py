@@ -1,19 +1,20 @@
 """Compares servo presets and fits with logs of real servos on a pendulum bench that they did not
 see, and with BAM's scheme; prints each row of the table in docs/reality.md.
 
-usage: python -m benchmarks.identify.servos [--kscale FOLDER] [--pictures FOLDER] [--workers N]
-       [-o FILE.csv]
+usage: python -m benchmarks.identify.servos [--xl330 FOLDER] [--kscale FOLDER] [--pictures FOLDER]
+       [--workers N] [-o FILE.csv]
 
 The logs are not part of the repository: those of an XL330 (github.com/Rhoban/bam) are read from the
 folder shared/data/servo_logs beside the repository, those of K-Scale (github.com/kscalelabs/sysid,
-commit ca1ecb1) from a folder that is given. What is not there is left out with a note.
+commit ca1ecb1) from a folder that is given. Of motors without logs there is a note, and the file
+keeps the rows that it has.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import replace
 from itertools import repeat, zip_longest
@@ -176,13 +177,15 @@ def compared(
 
 
 def found_rows(
-    kscale: Path | None, pictures: Path | None, pool: Executor
+    xl330: Path, kscale: Path | None, pictures: Path | None, pool: Executor
 ) -> Iterator[dict[str, str]]:
     """Yields the rows of the motors that there are logs of."""
     for motor, presets in PRESETS.items():
-        logs = found_logs(XL330 if motor == "xl330" else kscale, motor)
+        folder, variable = (xl330, "XL330") if motor == "xl330" else (kscale, "KSCALE")
+        logs = found_logs(folder, motor)
         if not logs:
-            print(f"{motor}: no logs here; see {XL330} and --kscale")
+            place = f"in {folder}" if folder else "are named"
+            print(f"{motor}: no logs {place}; make bench-servos {variable}=FOLDER")
             continue
         divisions = divided(logs)
         judged_on, (*_, (_, unseen)) = next(iter(divisions.items()))
@@ -198,9 +201,26 @@ def found_rows(
             yield repeated(motor, logs)
 
 
+def motor_of(row: Mapping[str, str]) -> str:
+    """Returns the motor of a row of the table."""
+    return row["servo"].replace(",", "_").partition("_")[0]
+
+
+def with_kept(rows: Sequence[dict[str, str]], file: Path) -> list[dict[str, str]]:
+    """Returns new rows, and those of other motors that a file has, in the order of PRESETS."""
+    before: list[dict[str, str]] = []
+    if file.exists():
+        with file.open(encoding="utf-8", newline="") as table:
+            before = list(csv.DictReader(table))
+    new = {motor_of(row) for row in rows}
+    kept = [row for row in before if motor_of(row) not in new]
+    return sorted([*rows, *kept], key=lambda row: list(PRESETS).index(motor_of(row)))
+
+
 def main() -> int:
     """Prints and writes the table."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
+    parser.add_argument("--xl330", type=Path, default=XL330, help="folder of BAM's logs")
     parser.add_argument("--kscale", type=Path, help="folder of K-Scale's raw logs")
     parser.add_argument("--pictures", type=Path, help="where to draw two logs of xl330_fitted")
     parser.add_argument("-o", "--output", type=Path, help="CSV file")
@@ -208,10 +228,11 @@ def main() -> int:
     given = parser.parse_args()
     rows: list[dict[str, str]] = []
     with ProcessPoolExecutor(given.workers, mp_context=get_context("spawn")) as pool:
-        for row in found_rows(given.kscale, given.pictures, pool):
+        for row in found_rows(given.xl330, given.kscale, given.pictures, pool):
             rows.append(row)
             print(", ".join(f"{key} {value}" for key, value in row.items() if value), flush=True)
     if given.output and rows:
+        rows = with_kept(rows, given.output)
         given.output.parent.mkdir(parents=True, exist_ok=True)
         with given.output.open("w", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")

@@ -1,7 +1,7 @@
 .PHONY: identify-campaign bench-servos
 help-extensions::
 	@echo "make identify-campaign  20 robots with secret numbers, identified from logs of 6 s (10 min); ROBOTS, SECONDS, AT_A_TIME; goes on with out/identification_SECONDS.csv"
-	@echo "make bench-servos  presets of servos against logs of real ones; KSCALE=FOLDER for those of K-Scale"
+	@echo "make bench-servos  presets of servos against logs of real ones; XL330=FOLDER, KSCALE=FOLDER: of BAM, of K-Scale"
 
 ROBOTS ?= 20
 SECONDS ?= 6
@@ -10,7 +10,7 @@ identify-campaign: setup
 	PYTHONPATH=tests/support:tests/identify $(BIN)/python -m benchmarks.identify.robots --robots $(ROBOTS) --seconds $(SECONDS) \
 		--workers $(AT_A_TIME) --table out/identification_$(SECONDS).csv
 
-# KSCALE=FOLDER: the raw logs of kscalelabs/sysid
+# XL330=FOLDER: logs of Rhoban/bam; KSCALE=FOLDER: the raw logs of kscalelabs/sysid
 bench-servos: setup
-	$(BIN)/python -m benchmarks.identify.servos $(if $(KSCALE),--kscale $(KSCALE)) --pictures docs/images -o benchmarks/results/servos.csv
+	$(BIN)/python -m benchmarks.identify.servos $(if $(XL330),--xl330 $(XL330)) $(if $(KSCALE),--kscale $(KSCALE)) --pictures docs/images -o benchmarks/results/servos.csv
 	$(BIN)/python -m benchmarks.identify.hip

@@ -15,6 +15,7 @@ import tomlkit
 from secret_robots import SEEN, Secret, secret_robot
 from test_bench import made_log
 
+from benchmarks.identify.servos import with_kept
 from hexapod_cosim.cosim.export.plant import export_fmu
 from hexapod_cosim.extensions.identify.bench.choice import choose
 from hexapod_cosim.extensions.identify.bench.command import (
@@ -190,3 +191,16 @@ def test_a_start_that_no_model_beats_is_said_to_be_better() -> None:
     assert max(digits) == 7
     kept = servo_table(table, "servo")
     assert kept["torque_constant"] == pytest.approx(found.fit.robot.servo.torque_constant, rel=1e-6)
+
+
+def test_rows_of_motors_without_logs_are_kept(tmp_path: Path) -> None:
+    before = ["xl330_m1", "xl330, m1 fitted", "sts3215_m1", "sts3215", "sts3250, m6 fitted"]
+    text = "\n".join(["servo,logs", *(f'"{name}",1' for name in before)])
+    (tmp_path / "servos.csv").write_text(text, encoding="utf-8")
+    rows = [{"servo": "sts3215_12v", "logs": "2"}, {"servo": "sts3215, m1 fitted", "logs": "2"}]
+    kept = with_kept(rows, tmp_path / "servos.csv")
+    assert [(row["servo"], row["logs"]) for row in kept] == [
+        ("xl330_m1", "1"), ("xl330, m1 fitted", "1"), ("sts3215_12v", "2"),
+        ("sts3215, m1 fitted", "2"), ("sts3250, m6 fitted", "1"),
+    ]  # fmt: skip
+    assert with_kept(rows, tmp_path / "none.csv") == rows
