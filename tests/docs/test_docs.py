@@ -138,7 +138,7 @@ def test_formulas_of_the_site_are_drawn_and_numbered_without_a_network(site: Pat
         assert page.locator(".math:not(:has(svg))").count() == 0
         assert page.locator("[data-mjx-error]").count() == 0
         tags = page.locator("[id^='mjx-eqn']").evaluate_all("found => found.map(one => one.id)")
-    assert tags == [f"mjx-eqn:{number}" for number in range(1, 59)]
+    assert tags == [f"mjx-eqn:{number}" for number in range(1, 60)]
 
 
 def test_every_variable_is_in_the_reference(reference: dict[str, str]) -> None:
