@@ -460,7 +460,7 @@ static hxStatus step_in_parts(fmi3InstanceData *instance, double t, double *end,
     if (found && base->may_return_early) break;
     if (status == HX_OK && hx_instance_time(base) < *end) update_intermediate(instance, end);
   }
-  if (status != HX_OK && instance->before) hx_instance_restore(base, instance->before);
+  if (status != HX_OK) hx_instance_restore(base, instance->before);
   return status;
 }
 

@@ -83,6 +83,19 @@ def decoding_toml(path: Path, *, kind: str, error: type[HexapodError]) -> Iterat
         ) from cause
 
 
+def preset_tables(folder: Path) -> Iterator[tuple[str, dict[str, Any], str]]:
+    """Yields name, table and place for messages of each table in a folder's TOML files, sorted by
+    name. A table has the keys of its file's [shared] that it does not give itself.
+    """
+    found: dict[str, tuple[dict[str, Any], str]] = {}
+    for path in folder.glob("*.toml"):
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        shared = tables.pop("shared", {})
+        found |= {name: (shared | given, f"{path}: {name}") for name, given in tables.items()}
+    for name in sorted(found):
+        yield name, *found[name]
+
+
 def path_of(
     path_or_name: str | Path, kind: str, bundled: Mapping[str, Path], error: type[HexapodError]
 ) -> Path:

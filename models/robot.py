@@ -104,7 +104,7 @@ def _robot_from_urdf(table: Mapping[str, Any], where: str) -> Robot:
 
 def robot_path(path_or_name: str | Path) -> Path:
     """Returns the path of a robot file, given by path or by name."""
-    own = {path.stem: path for path in sorted(Path(__file__).parent.glob("*.toml"))}
+    own = {name: Path(__file__).parent / f"{name}.toml" for name in list_robots()}
     return path_of(path_or_name, "robot", own, RobotError)
 
 

@@ -39,7 +39,7 @@ from wheel.wheelfile import WheelFile, get_zipinfo_datetime
 
 from hexapod_cosim.cosim.cli.extension import extensions_in, loaded
 from hexapod_cosim.cosim.common.components import CONTROLLER, PLANT, Component
-from hexapod_cosim.cosim.common.plant_files import LOOP, fmi_headers
+from hexapod_cosim.cosim.common.plant_files import fmi_headers, loop_folders
 from hexapod_cosim.cosim.export.cross_build import TARGETS, Library, build_library
 from hexapod_cosim.cosim.export.platforms import component_library
 
@@ -163,15 +163,8 @@ def cross_compile() -> dict[tuple[str, str], bytes]:
 
 
 def loop_libraries() -> list[Library]:
-    """Returns the co-simulation loop as a library, and those of extensions, which contain it, as
-    their CMakeLists.txt build them.
-    """
-    core = ROOT / "cosim" / "master"
-    added = sorted(ROOT.glob("extensions/*/loop"))
-    return [
-        _loop_library(LOOP, [core]),
-        *(_loop_library(f"hexapod_{path.parent.name}", [core, path]) for path in added),
-    ]
+    """Returns the libraries with the co-simulation loop, as their CMakeLists.txt build them."""
+    return [_loop_library(name, folders) for name, folders in loop_folders().items()]
 
 
 def _loop_library(name: str, loops: Sequence[Path]) -> Library:
@@ -198,7 +191,7 @@ def write_wheel(
     binaries: by library and target; the loops of the platform's own target are packed, and the
         FMUs' binaries of all targets.
     """
-    loops = {library.name for library in loop_libraries()}
+    loops = loop_folders()
     (description,) = (name for name in base if name.endswith(".dist-info/WHEEL"))
     members = dict(base)
     members[description] = wheel_description(base[description], platform.tag)

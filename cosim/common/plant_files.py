@@ -228,15 +228,21 @@ def shared_library(name: str) -> Path:
     if not found:
         raise FmuError("a library is missing", got=f"no {name}", expected="a built one", fix=BUILD)
     newest = max(found, key=lambda path: path.stat().st_mtime)
-    _refuse_stale(newest, f"the library {name}", _loop_sources(name))
+    sources: dict[str, Path] = {}
+    for folder in loop_folders()[name]:
+        sources |= _sources_in(folder.name, folder)
+    _refuse_stale(newest, f"the library {name}", sources)
     return newest
 
 
-def _loop_sources(name: str) -> dict[str, Path]:
-    """Returns the sources of a library with the co-simulation loop, which extensions' contain."""
-    added = (_COSIM.parent / "extensions").glob("*/loop")
-    folders = [_COSIM / "master", *(path for path in added if name.endswith(path.parent.name))]
-    return {key: path for one in folders for key, path in _sources_in(one.name, one).items()}
+def loop_folders() -> dict[str, list[Path]]:
+    """Returns the folders of the sources of each library with the co-simulation loop, by its name.
+
+    The libraries of extensions contain the core's loop.
+    """
+    core, added = _COSIM / "master", (_COSIM.parent / "extensions").glob("*/loop")
+    own = {f"hexapod_{path.parent.name}": [core, path] for path in sorted(added)}
+    return {LOOP: [core]} | own
 
 
 def installed_platforms() -> list[str]:

@@ -46,10 +46,8 @@ def open_description(path: Path) -> Any:
         description = read_model_description(path, validate=False)
     except Exception as error:
         of_python = isinstance(error, TypeError | AttributeError | ValueError | LookupError)
-        what, expected = (
-            f"the FMU's {DESCRIPTION} cannot be read",
-            "XML after the standard's schema",
-        )
+        what = f"the FMU's {DESCRIPTION} cannot be read"
+        expected = "XML after the standard's schema"
         got = "missing or wrong attributes" if of_python else str(error)
         raise _refusal(what, got, expected, path) from error
     _refuse_identifiers(description, path)

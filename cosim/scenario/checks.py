@@ -46,13 +46,14 @@ def check_interval(scenario: Scenario) -> None:
     """Checks that `outputs.interval` is a whole number of macro-steps. Raises ScenarioError."""
     interval, where = scenario.outputs.interval, f"{scenario.where}: outputs.interval"
     if interval:
-        _check_multiple(interval, scenario.every, scenario.macro_step, where)
+        hint = "; 0 keeps every macro-step"
+        _check_multiple(interval, scenario.every, scenario.macro_step, where, hint)
 
 
-def _check_multiple(time: float, steps: int, h: float, where: str) -> None:
+def _check_multiple(time: float, steps: int, h: float, where: str, hint: str = "") -> None:
     """Raises ScenarioError for a time [s] that is not so many macro-steps h [s] long."""
     if abs(time / h - steps) > WHOLE_STEPS_TOLERANCE * steps:
-        expected, fix = f"a multiple of macro_step = {h:g} s", f"{steps * h:g} is the nearest"
+        expected, fix = f"a multiple of macro_step = {h:g} s", f"{steps * h:g} is the nearest{hint}"
         what = "not a whole number of macro-steps"
         raise ScenarioError(what, got=time, expected=expected, fix=fix, where=where)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, replace
 from dataclasses import fields as dataclass_fields
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from hexapod_cosim.models.errors import HexapodError, RobotError, unknown_name
+from hexapod_cosim.models.files import preset_tables
 from hexapod_cosim.models.records import Servo
 from hexapod_cosim.models.schema import (
     Choice,
@@ -66,16 +66,12 @@ class Measured:
 def _measured() -> dict[str, Measured]:
     """Returns all servos, sorted by name."""
     found = {}
-    for path in sorted((Path(__file__).parent / "data").glob("*.toml")):
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-        shared = tables.pop("shared", {})
-        for name, given in tables.items():
-            where, table = f"{path}: {name}", shared | given
-            own = {key: table.pop(key) for key in specs(About) if key in table}
-            own["source"] = own["source"].format_map(own)
-            about = About(**require(About, read_given(About, own, where), where))
-            found[name] = Measured(about, read_given(Servo, table, where))
-    return {name: found[name] for name in sorted(found)}
+    for name, table, where in preset_tables(Path(__file__).parent / "data"):
+        own = {key: table.pop(key) for key in specs(About) if key in table}
+        own["source"] = own["source"].format_map(own)
+        about = About(**require(About, read_given(About, own, where), where))
+        found[name] = Measured(about, read_given(Servo, table, where))
+    return found
 
 
 def list_servos() -> list[str]:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from hexapod_cosim.models.errors import HexapodError, RobotError, unknown_name
+from hexapod_cosim.models.files import preset_tables
 from hexapod_cosim.models.schema import Choice, Number, expect_table, read_given, require
 
 SOIL_LAWS = ("none", "bekker", "granular", "mud")
@@ -57,15 +57,11 @@ class Preset:
 def _presets() -> dict[str, Preset]:
     """Returns all presets, sorted by name."""
     found = {}
-    for path in sorted((Path(__file__).parent / "data").glob("*.toml")):
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-        shared = tables.pop("shared", {})
-        for name, given in tables.items():
-            where, table = f"{path}: {name}", shared | given
-            title, source = table.pop("title"), table.pop("source")
-            soil = Soil(**require(Soil, read_given(Soil, table, where), where))
-            found[name] = Preset(soil, title, source)
-    return {name: found[name] for name in sorted(found)}
+    for name, table, where in preset_tables(Path(__file__).parent / "data"):
+        title, source = table.pop("title"), table.pop("source")
+        soil = Soil(**require(Soil, read_given(Soil, table, where), where))
+        found[name] = Preset(soil, title, source)
+    return found
 
 
 def list_soils() -> list[str]:

@@ -34,6 +34,10 @@ double hx_largest(double so_far, const void *first, size_t n) {
   return so_far;
 }
 
+int hx_is_attitude(const double q[4]) {
+  return q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] > 1e-6;
+}
+
 void hx_plant_command(const hxPlant *plant, const hxInput *input, hxCommand *command) {
   hx_command_from_input(command, input, plant->state.time);
   hx_held_commands(command, &plant->model, &plant->state);
@@ -132,13 +136,11 @@ hxStatus hx_plant_set_bodies(hxPlant *plant, const double body[HX_BODIES][HX_BOD
   if (!isfinite(hx_largest(0.0, body, HX_BODIES * HX_BODY_STATE)))
     return hx_plant_fail(plant, HX_INVALID_ARGUMENT,
                          "body state: got a number that is not finite, expected finite numbers");
-  for (int k = 0; k < HX_BODIES; ++k) {
-    const double *q = body[k] + HX_P;
-    if (!(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] > 1e-12))
+  for (int k = 0; k < HX_BODIES; ++k)
+    if (!hx_is_attitude(body[k] + HX_P))
       return hx_plant_fail(plant, HX_INVALID_ARGUMENT,
                            "body state: got a quaternion of zeros, expected one of length 1; set "
                            "all bodies' quaternions");
-  }
   hx_motion_from_bodies(&plant->model, body, &plant->state.motion);
   hx_kernel()->start(&plant->model, plant->state.time, &plant->state, plant->scratch);
   return HX_OK;

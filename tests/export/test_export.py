@@ -15,6 +15,7 @@ import fmpy.build
 import fmpy.validation
 import numpy as np
 import pytest
+from building import TARGETS
 from fmi_plant import ATHENA, OK, Plant
 
 from hexapod_cosim.cosim.common import plant_files
@@ -29,6 +30,7 @@ from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.robot import list_robots, load_robot
 
 ROOT = Path(__file__).parents[2]
+LOOPS = ("hexapod_master", "hexapod_gym")
 
 
 @pytest.fixture
@@ -282,7 +284,7 @@ def test_a_binary_is_stale_a_second_before_its_newest_source(
         assert plant_files.binary(plant_files.fmi2_platform()) == library
 
 
-@pytest.mark.parametrize("name", ["hexapod_master", "hexapod_gym"])
+@pytest.mark.parametrize("name", [name for name in TARGETS if name in LOOPS])
 def test_a_loop_s_library_is_stale_a_second_before_its_newest_source(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:

@@ -157,7 +157,6 @@ void hx_follow_goals(const hxCommand *goal, const hxModel *model, hxState *state
 }
 
 void hx_count_overload(const hxCommand *command, const hxModel *model, hxState *state, double h) {
-  if (!(model->overload_time > 0.0)) return;
   for (int joint = 0; joint < HX_JOINTS; ++joint)
     for (int slot = 0; slot < HX_SLOTS; ++slot) {
       const double wanted = wanted_torque(command, model, &state->moment, joint, slot);

@@ -70,10 +70,7 @@ static void follow_goals(hxPlant *plant, int resumes, double t_end, hxCommand *c
 
 /* Moves a command along its change per second up to a time, s. */
 static void move_command(hxCommand *command, const hxCommand *ramp, double time) {
-  enum { SIZE = sizeof(hxCommand) / sizeof(double) };
-  const double elapsed = time - command->time, *rate = (const double *)ramp;
-  double *to = (double *)command;
-  for (int i = 0; i < SIZE; ++i) to[i] += elapsed * rate[i];
+  hx_ramp(command, ramp, time - command->time, sizeof *command / sizeof(double), command);
   command->time = time;
 }
 
@@ -116,8 +113,10 @@ static hxStatus advance_part(hxPlant *plant, const hxStepCall *call, double t_en
   const int interrupted = state->time < end;
   state->call_input = interrupted ? call->fingerprint : 0.0;
   state->call_start = interrupted ? command.time : 0.0;
-  move_command(&command, &ramp, state->time);
-  hx_count_overload(&command, &plant->model, state, state->time - begin);
+  if (plant->model.overload_time > 0.0) {
+    move_command(&command, &ramp, state->time);
+    hx_count_overload(&command, &plant->model, state, state->time - begin);
+  }
   return status;
 }
 

@@ -20,10 +20,9 @@ static const double largest_coordinate = 1e9, largest_angle = 1e5;
 
 /* Returns whether coordinates are a state of the robot. */
 static int are_valid_coordinates(const hxCoordinates *x) {
-  const double *p = x->quaternion;
   return hx_largest(0.0, x, HX_COORDINATES) <= largest_coordinate &&
          hx_largest(0.0, x->angle, HX_LEGS * HX_JOINTS) <= largest_angle &&
-         p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3] > 1e-6;
+         hx_is_attitude(x->quaternion);
 }
 
 hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates *x) {

@@ -23,6 +23,9 @@ void hx_plant_command(const hxPlant *plant, const hxInput *input, hxCommand *com
 /* Returns the largest magnitude of so_far and n numbers; NaN or infinity persists. */
 double hx_largest(double so_far, const void *first, size_t n);
 
+/* Returns whether a quaternion is long enough to be normalised. */
+int hx_is_attitude(const double q[4]);
+
 /* Returns whether a definition's ground is there and suits its contacts; else writes why not. */
 hxStatus hx_plant_check_terrain(hxPlant *plant, const hxDefinition *d, char *message);
 
