@@ -17,7 +17,7 @@ import numpy as np
 from hexapod_cosim.controller.comply.compliant import Compliant, PresentStep
 from hexapod_cosim.controller.gains import Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, rows_of
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, rows_of, some
 from hexapod_cosim.controller.planned_step import PlannedStep, StepPlanner
 from hexapod_cosim.controller.signals import JointCommand
 from hexapod_cosim.controller.walk.absence import Absence
@@ -172,7 +172,7 @@ class WalkPlan(Stateful):
         self.absence.since += 1
         number = self.at + 1
         reached, planned = clock.reach(number), number <= self.last
-        reached = reached and not self.paths.down(self.now.feet).any()
+        reached = reached and not some(self.paths.down(self.now.feet))
         self.cut = planned and not reached
         if reached and planned:
             self.after = self._plan_step(number, self.now)
@@ -197,9 +197,9 @@ class WalkPlan(Stateful):
         """
         clock, absence = self.paths.clock, self.absence
         waits = lost & bearing & ~clock.swinging & ~absence.legs
-        waits = waits & (absence.has_room() and (clock.swinging & ~lost).any())
+        waits = waits & (absence.has_room() and some(clock.swinging & ~lost))
         new = absence.change(lost & ~waits, out)
-        if new or (waits.any() and not clock.dropped.any()):
+        if new or (some(waits) and not some(clock.dropped)):
             clock.absent = absence.legs
             self.end()
             clock.drop()

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, clamp
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, clamp, some
 from hexapod_cosim.controller.signals import JointCommand
 from hexapod_cosim.controller.walk.gait import PATTERNS, Gait
 from hexapod_cosim.controller.walk.kinematics import LegSolver
@@ -32,7 +32,7 @@ ARRIVED = 1e-3  # rad    a command this near to the plan is the plan
 
 def gait_without(gait: Gait, absent: Mask, *, backwards: bool) -> Gait:
     """Returns the wave of the legs that are not absent (6,), or the gait if none is."""
-    if not absent.any():
+    if not some(absent):
         return gait
     phases = PATTERNS["wave"].offsets
     order = sorted(np.flatnonzero(~absent).tolist(), key=lambda leg: phases[leg])
@@ -110,7 +110,7 @@ class Absence(Stateful):
         new = lost & ~self.legs
         room = MOST_ABSENT - int(self.legs.sum())
         new = new & (np.cumsum(new) <= room)
-        if not new.any():
+        if not some(new):
             return False
         self.command = np.where(new[:, None], out.angle_ref, self.command)
         self.place = np.where(new[:, None], out.angle_ref, self.place)
@@ -119,9 +119,7 @@ class Absence(Stateful):
 
     def take_back(self, leg: int) -> None:
         """Takes a leg back into service."""
-        legs = self.legs.copy()
-        legs[leg] = False
-        self._set(legs)
+        self._set(self.legs & (np.arange(LEGS) != leg))
 
     def _set(self, legs: Mask) -> None:
         self.begin, self.gone = self.torso(0), self.legs
@@ -133,10 +131,6 @@ class Absence(Stateful):
         """Returns the way of the torso `ahead` periods after the present step [m]."""
         x = min((self.since + ahead) * self.period / SHIFT_TIME, 1.0)
         return self.begin + (self.goal - self.begin) * (x * x * (3.0 - 2.0 * x))
-
-    def settled(self) -> bool:
-        """Returns whether the torso has reached its way."""
-        return self.since * self.period >= SHIFT_TIME
 
     def drift(self, ahead: int) -> complex:
         """Returns the velocity that leads the torso back to its path `ahead` periods later [m/s].
