@@ -19,7 +19,7 @@ from hexapod_cosim.models import Robot, load_robot
 H = 0.005  # s    period
 ROBOT = load_robot("athena")
 SOLVER = LegSolver(ROBOT)
-LF, LM, RR = 0, 1, 5
+LF, LM, LR, RR = 0, 1, 2, 5
 
 
 def mask(*legs: int) -> Mask:
