@@ -50,8 +50,7 @@ HX_RARE void hx_gait_without(hxGait *gait, const int absent[HX_LEGS], int backwa
       place += !absent[k] && (backwards ? phase[k] < phase[leg] : phase[k] > phase[leg]);
     gait->offset[leg] = absent[leg] || place == 0 ? 0.0 : 1.0 - (double)place / count;
   }
-  /* an absent leg gives up its load while it stands by the clock: the one opposite it steps first
-   */
+  /* an absent leg gives up its load while it stands: the leg opposite it steps first */
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const int opposite = HX_LEGS - 1 - leg;
     const double phase_of_it = absent[opposite] ? 0.0 : gait->offset[opposite];
