@@ -13,7 +13,7 @@ from itertools import combinations, product
 from pathlib import Path
 
 from benchmarks import RESULTS
-from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.results.summary import REFUSED, Summary
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.events import WHOLE_LEG
 from hexapod_cosim.cosim.scenario.reading import load_scenario
@@ -68,6 +68,9 @@ def walks(control: str, loss: str, ground: str, seeds: int) -> Iterator[Scenario
 
 def shares(summaries: Sequence[Summary]) -> list[str]:
     """Returns the shares of walks that arrived, and that kept PATH and PEAK too, in percent."""
+    for run in summaries:
+        if run.status == REFUSED:  # it says nothing about the walk
+            raise SystemExit(run.reason)
     arrived = [run for run in summaries if run.success]
     kept = [run for run in arrived if run.metrics["path_error"] <= PATH]
     soft = [run for run in arrived if run.metrics["peak_force"] <= PEAK]
