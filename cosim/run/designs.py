@@ -40,10 +40,14 @@ def designed_gains(robot: Robot, period: float) -> Gains:
     They are designed once and kept in the user's cache. Raises GainsError when no gains can be
     designed.
     """
-    # imported here: python-control takes a second
+    return kept_gains(robot, period, _design)
+
+
+def _design(robot: Robot, period: float) -> Gains:
+    # imported only where gains are designed: python-control takes a second
     from hexapod_cosim.cosim.design.gains import design_for  # noqa: PLC0415
 
-    return kept_gains(robot, period, design_for)
+    return design_for(robot, period)
 
 
 def kept_gains(

@@ -376,7 +376,11 @@ def test_the_page_of_compliant_control_quotes_the_table_of_the_course() -> None:
 
 def test_the_page_of_lost_legs_has_the_shares_that_the_benchmark_wrote() -> None:
     with (ROOT / "benchmarks" / "results" / "loss.csv").open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["control"] == "compliant"]
+        found = list(csv.DictReader(file))
+    flat = [row for row in found if row["ground"] == "flat" and row["lost"] != "two legs"]
+    assert [row["noticed"] for row in flat] == ["100"] * 6
+    rows = [row for row in found if row["control"] == "compliant"]
+    assert [row["regained"] for row in flat if row in rows] == ["100"] * 3
     expected: dict[str, list[str]] = {}
     for row in rows:
         share = "{arrives} ({path}, {peak})".format(**row)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -63,6 +64,15 @@ def test_kept_gains_have_the_bits_of_designed_ones(tmp_path: Path) -> None:
 
 def _no_design(robot: Robot, period: float) -> Gains:
     raise AssertionError("gains that are kept are not designed again")
+
+
+def test_gains_from_the_cache_do_not_import_python_control(
+    designs: list[Design], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = chosen_gains(scenario())
+    designed_gains.cache_clear()
+    monkeypatch.setitem(sys.modules, "hexapod_cosim.cosim.design.gains", None)  # refuses an import
+    assert chosen_gains(scenario()) == first
 
 
 def test_a_damaged_file_of_the_cache_is_replaced(designs: list[Design], tmp_path: Path) -> None:
