@@ -19,7 +19,7 @@ from hexapod_cosim.models import Robot, load_robot
 H = 0.005  # s    period
 ROBOT = load_robot("athena")
 SOLVER = LegSolver(ROBOT)
-LF, LM, RR = 0, 1, 5
+LF, LM, LR, RR = 0, 1, 2, 5
 
 
 def mask(*legs: int) -> Mask:
@@ -235,10 +235,13 @@ def lost(*legs: int) -> Absence:
     return absence
 
 
-def test_the_torso_moves_over_the_other_feet_and_the_walk_takes_it_back() -> None:
-    absence = lost(LF)
-    others = absence.home[~mask(LF)].mean()
-    others *= 0.045 / abs(others)  # as far as the legs' reach allows
+@pytest.mark.parametrize(("legs", "most"), [((LF,), 0.045), ((LF, LR), 0.09)])
+def test_the_torso_moves_over_the_other_feet_and_the_walk_takes_it_back(
+    legs: tuple[int, ...], most: float
+) -> None:
+    absence = lost(*legs)
+    others = absence.home[~mask(*legs)].mean()
+    others *= most / abs(others)  # as far as the legs' reach allows
     assert absence.torso(0) == 0.0
     assert absence.torso(round(SHIFT_TIME / H)) == pytest.approx(others)
     way = H * sum(absence.drift(k) for k in range(round((SHIFT_TIME + BACK_TIME) / H) + 1))
