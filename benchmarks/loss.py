@@ -1,12 +1,14 @@
 """Measures walks that lose servos or legs, by control, loss and ground (docs/control/loss.md).
 
 `python -m benchmarks.loss` writes benchmarks/results/loss.csv, the percentages of walks that
-arrived, kept PATH, kept PEAK, noticed the loss and regained their speed in time.
+arrived, kept PATH, kept PEAK, noticed the loss and regained their speed in time. With --pushes it
+prints what pushes change instead.
 """
 
 from __future__ import annotations
 
 import csv
+import math
 from argparse import ArgumentParser
 from collections.abc import Iterator, Sequence
 from functools import cache
@@ -118,6 +120,37 @@ def slow_until(result: Result) -> float:
     return float(time[begins[slow]].max(initial=LOST))
 
 
+def pushed(control: str, law: str) -> Iterator[Scenario]:
+    """Yields walks with a push of 50 N for 0.2 s from 8 directions at 8 phases of the gait."""
+    for phase, direction in product(range(8), range(8)):
+        angle = 0.25 * math.pi * direction
+        force = [round(50.0 * math.cos(angle), 6), round(50.0 * math.sin(angle), 6), 0.0]
+        event = f"{{time = {4.0 + 1.5 * phase / 8}, duration = 0.2, force = {force}}}"
+        overrides = ["duration=10", "command.vx=0.08", f"events=[{event}]"]
+        overrides += [f"control={control}", f"friction.law={law}"]
+        yield load_scenario("walk_flat", overrides=overrides)
+
+
+def push_figures(scenario: Scenario) -> tuple[float, float, float]:
+    """Runs a walk. Returns whether it arrived, its peak force [BW] and its path error [m/m]."""
+    summary = summarise(runner().simulate(scenario))
+    return summary.success, summary.metrics["peak_force"], summary.metrics["path_error"]
+
+
+def print_pushes() -> None:
+    """Prints the figures of compliant control over those of kinematic control in its walk."""
+    with Pool() as pool:
+        for law in ("tanh", "bristle"):
+            mine, other = (
+                np.array(pool.map(push_figures, pushed(control, law), chunksize=1), dtype=float)
+                for control in ("compliant", "kinematic@chosen")
+            )
+            ratio = mine[:, 1:] / other[:, 1:]
+            print(f"{law}: {mine[:, 0].sum():.0f} of {len(mine)} arrive")
+            print(f"peak and path, medians {np.median(ratio, axis=0).round(2)}")
+            print(f"largest {ratio.max(axis=0).round(2)}")
+
+
 def percentages(runs: Sequence[Sequence[bool]]) -> list[str]:
     """Returns the percentages of runs (walks, FIGURES) that are true."""
     return [f"{100.0 * share:.0f}" for share in np.mean(runs, axis=0)]
@@ -128,7 +161,11 @@ def main() -> None:
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("-o", dest="file", type=Path, default=RESULTS / "loss.csv")
+    parser.add_argument("--pushes", action="store_true")
     given = parser.parse_args()
+    if given.pushes:
+        print_pushes()
+        return
     with given.file.open("w", encoding="utf-8", newline="") as file, Pool() as pool:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(("control", "lost", "ground", "walks", *FIGURES))

@@ -170,11 +170,9 @@ class Compliant(Stateful):
         phase: (6,) of the legs [1]; plane: (6,) feet x + i y, walking frame [m]; clock: of the
         gait, in the section of the step; presence: (6,) factors of the legs [1].
         """
-        activation = self.support.activation(
-            phase, clock.stayed, clock.stays, walking=clock.walking
-        )
-        activation = np.where(clock.awaited, 0.0, activation * presence)
-        return activation, self.support.lowering(plane, activation)
+        active = self.support.activation(phase, clock.stayed, clock.stays, walking=clock.walking)
+        active = np.where(clock.awaited, 0.0, active * presence)
+        return active, self.support.lowering(plane, active)
 
     # ------------------------------------------------------------------------------- steering
 

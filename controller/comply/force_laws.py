@@ -91,13 +91,12 @@ class ForceLaws(Stateful):
         self.watch = SensorWatch(weight, cycle=cycle, period=period)
         self.touchdown = Touchdown(period=period)
         time = gains.support.weight_time
-        most = gains.limits.torque
-        self.limit = LoadLimit(most=most, cycle=cycle, period=period, weight_time=time)
+        self.most = gains.limits.torque  # N m
+        self.limit = LoadLimit(most=self.most, cycle=cycle, period=period, weight_time=time)
         self.trust = Trust(cycle=cycle, period=period, load_time=gains.support.load_time)
         self.follow_load = 1.0 - math.exp(-period / gains.support.load_time)
         self.follow_cycle = 1.0 - math.exp(-period / cycle)
         self.follow_weight = 1.0 - math.exp(-period / gains.support.weight_time)
-        self.most = gains.limits.torque  # N m
         self.reset()
 
     def reset(self) -> None:

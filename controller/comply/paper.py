@@ -65,9 +65,7 @@ class Paper(Stateful):
         shift, lift: (6,) corrections of the feet, torso frame, x + i y and z [m].
     """
 
-    STATE = (
-        "force", "weight", "back", "sag", "lifted", "yielded", "late", "shift", "lift",
-    )  # fmt: skip
+    STATE = ("force", "weight", "back", "sag", "lifted", "yielded", "late", "shift", "lift")
 
     def __init__(
         self,
@@ -150,15 +148,14 @@ class Paper(Stateful):
 
     def _suspend(self, step: Step, total: float) -> None:
         """Updates the deflections of the suspensions (C48). total: of the normal forces [N]."""
-        h = self.period
         contact = step.force[:, 2] > max(CONTACT_PART * self.weight, LEAST_LOAD)
         missing = ~contact & ~step.swinging & (total >= WHOLE_PART * self.weight)
-        self.late = np.where(missing, self.late + h, 0.0)
+        self.late = np.where(missing, self.late + self.period, 0.0)
         # the damper yields to the force beyond the share of a foot
         rate = (step.force[:, 2] - self.weight / LEGS) / self.gains.damping
         descent = np.where(step.height > EARLY_HEIGHT, np.maximum(-step.rise, 0.0), 0.0)
-        met = self.yielded + h * clamp(rate, 0.0, descent)
-        sought = self.yielded + h * clamp(rate, -SEARCH_SPEED, 0.0)
+        met = self.yielded + self.period * clamp(rate, 0.0, descent)
+        sought = self.yielded + self.period * clamp(rate, -SEARCH_SPEED, 0.0)
         kept = np.where(step.swinging & ~contact, self.in_air, self.on_ground)
         moved = np.where(step.swinging & contact, met, kept * self.yielded)
         moved = np.where(self.late > LATE_TIME, sought, moved)

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, clamp, some
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, clamp
 from hexapod_cosim.controller.signals import JointCommand
 from hexapod_cosim.controller.walk.gait import PATTERNS, Gait
 from hexapod_cosim.controller.walk.kinematics import LegSolver
@@ -21,7 +21,7 @@ MOST_ABSENT = 2  # legs: four must walk
 SWIFT, LOW_STEP = 0.6, 0.6  # 1    swing time and step height without a leg over those of the gait
 SHIFT_TIME = 0.4  # s    in which the torso moves over the other feet
 BACK_TIME = 3.0  # s    in which the walk then takes the torso back to its path
-FAR_SHIFT = 0.045  # m    at most
+FAR_SHIFT = 0.045  # m    at most for each lost leg
 FOLD_SPEED = 4.0  # rad/s
 LEAD = 0.15  # rad    of a command before its joint, at most
 LIMP_WAY = 0.25  # rad    from its place, at which a faulty joint has another one
@@ -32,7 +32,7 @@ ARRIVED = 1e-3  # rad    a command this near to the plan is the plan
 
 def gait_without(gait: Gait, absent: Mask, *, backwards: bool) -> Gait:
     """Returns the wave of the legs that are not absent (6,), or the gait if none is."""
-    if not some(absent):
+    if not absent.any():
         return gait
     phases = PATTERNS["wave"].offsets
     order = sorted(np.flatnonzero(~absent).tolist(), key=lambda leg: phases[leg])
@@ -108,9 +108,8 @@ class Absence(Stateful):
         out: the last joint commands.
         """
         new = lost & ~self.legs
-        room = MOST_ABSENT - int(self.legs.sum())
-        new = new & (np.cumsum(new) <= room)
-        if not some(new):
+        new = new & (np.cumsum(new) <= MOST_ABSENT - self.legs.sum())
+        if not new.any():
             return False
         self.command = np.where(new[:, None], out.angle_ref, self.command)
         self.place = np.where(new[:, None], out.angle_ref, self.place)
@@ -124,7 +123,8 @@ class Absence(Stateful):
     def _set(self, legs: Mask) -> None:
         self.begin, self.gone = self.torso(0), self.legs
         goal = complex(self.home[~legs].mean() - self.home.mean())
-        self.goal = goal * (FAR_SHIFT / max(abs(goal), FAR_SHIFT))
+        most = FAR_SHIFT * max(legs.sum(), 1)
+        self.goal = goal * (most / max(abs(goal), most))
         self.legs, self.since = legs, 0
 
     def torso(self, ahead: int) -> complex:

@@ -128,22 +128,18 @@ class FootPaths(Stateful):
     def _place_feet(self, feet: PlannedFeet, tau: Array, carried: Plane) -> PlannedFeet:
         """Computes positions and velocities of feet with known goals and pulls (C5 to C8).
 
-        tau: (6,) completed parts of the swings [1]; carried: (6,) feet at the step before, ground
-        frame [m].
+        tau: (6,) completed parts of the swings; carried: (6,) feet a step earlier, ground frame [m].
         """
-        away = self.clock.absent
+        clock, gait, away = self.clock, self.gait, self.clock.absent
         absent = some(away)
         if absent:  # these feet are above their stance positions
             place = feet.way + cis(feet.turn) * self.aims()
-            feet = feet._replace(
-                goal=np.where(away, place, feet.goal), pull=np.where(away, 0.0, feet.pull)
-            )
-        clock, gait = self.clock, self.gait
+            goal, pull = np.where(away, place, feet.goal), np.where(away, 0.0, feet.pull)
+            feet = feet._replace(goal=goal, pull=pull)
         R_KW = cis(-feet.turn)
         s, slope = blend(tau)
         lift, climb = hop(tau, top=gait.step_height, down=gait.touchdown_speed * self.swing_time)
-        # 1/s    at which the feet pass through their paths
-        pace = 0.0 if clock.waiting else 1.0 / self.swing_time
+        pace = 0.0 if clock.waiting else 1.0 / self.swing_time  # 1/s    of the feet on their paths
         rise = climb * pace
         if some(clock.dropped):
             high = feet.height - self.home_height

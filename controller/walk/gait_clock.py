@@ -115,7 +115,7 @@ class GaitClock(Stateful):
         self.standing = self._stands_after(self.before + 1)
         self.lifted = stood & ~self.standing & ~self.absent
         self.stayed = self.stayed | self.lifted
-        self.swinging = self.swinging & ~self.standing & ~self.absent
+        self.swinging = self.swinging & (~self.standing | self.dropped) & ~self.absent
         self.stays = NO_LEG
 
     def keep_down(self, kept: Mask) -> None:

@@ -122,7 +122,8 @@ void hx_tangent(void *memory, const void *constants, hxCoordinates *d_rate, hxOu
   hx_motion_from_coordinates(&point->model, &point->x, &point->state.motion);
   memset(all, 0, sizeof *all);
   hx_dynamics_evaluate(&point->model, &point->state.contact, &point->command,
-                       hx_re(point->state.time), &point->state.motion, NULL, NULL, 1, work, all);
+                       hx_re(point->state.time), &point->state.motion, NULL, NULL,
+                       HX_WITH_OPEN_CONTACTS, work, all);
   hx_coordinates_rate(&all->motion, work, &rate);
   hx_output_fill(&point->model, &point->state, work, HX_OUTPUT_ALL, output);
   if (d_rate)

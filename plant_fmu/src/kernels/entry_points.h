@@ -49,7 +49,8 @@ static void kernel_derivative(const hxModel *model, const hxState *state, const 
                               int multipliers, void *memory, hxPlantMotion *rate) {
   hxScratch *scratch = memory;
   hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL,
-                       multipliers, &scratch->work, &scratch->rate);
+                       multipliers ? HX_WITH_MULTIPLIERS : HX_RATES, &scratch->work,
+                       &scratch->rate);
   *rate = scratch->rate.motion;
 }
 
@@ -58,8 +59,8 @@ static void kernel_coordinates(const hxModel *model, const hxState *state, const
   hxScratch *scratch = memory;
   hxPlantMotion *motion_rate = &scratch->rate.motion;
   memset(motion_rate->bristle, 0, sizeof motion_rate->bristle);
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL, 0,
-                       &scratch->work, &scratch->rate);
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL,
+                       HX_RATES, &scratch->work, &scratch->rate);
   if (x) hx_coordinates_of(&state->motion, &scratch->work, x);
   if (rate) hx_coordinates_rate(motion_rate, &scratch->work, rate);
 }
@@ -154,18 +155,16 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   for (int node = 0; node <= INTERVALS; ++node) path.command[node] = command;
   hx_moment_of(model, &state->contact, &state->motion, end);
   end->time = state->time;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL, 1,
-                       &scratch->work, &scratch->rate);
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL,
+                       HX_WITH_OPEN_CONTACTS, &scratch->work, &scratch->rate);
   if (model->has_soil) {
     path.ends = &scratch->soil;
     hx_soil_ends(&state->contact, &state->moment, end, 0, &scratch->soil);
     hx_yield_soil(&state->contact, h, &state->moment, end, path.ends, path.plastic);
   }
   trapezoidal_impulses(model, &scratch->work, h, &state->completed, &impulses);
-  if (!known)
-    trapezoidal_impulses(
-        model, &scratch->work, h, &state->completed,
-        &impulses); /* the first step has no previous forces: they equal the present ones */
+  /* the first step has no previous forces: they equal the present ones */
+  if (!known) trapezoidal_impulses(model, &scratch->work, h, &state->completed, &impulses);
   hx_reset_peaks(&state->measured);
   if (h > 0.0) {
     hx_step_works(&path, &impulses, &works);
@@ -200,7 +199,7 @@ static void kernel_output(const hxModel *model, const hxState *state, const hxCo
   hxWork *work = &scratch->work;
   if (needs_accelerations(model, groups))
     hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL,
-                         1, work, &scratch->rate);
+                         HX_WITH_OPEN_CONTACTS, work, &scratch->rate);
   else if (groups & ~(unsigned)HX_OUTPUT_MOTION)
     hx_dynamics_forces(model, &state->contact, command, state->time, &state->motion, NULL, 0, 1,
                        work);
@@ -212,8 +211,8 @@ static void kernel_output(const hxModel *model, const hxState *state, const hxCo
 static void kernel_integral_rates(const hxModel *model, const hxState *state,
                                   const hxCommand *command, void *memory, hxOutput *rate) {
   hxScratch *scratch = memory;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL, 1,
-                       &scratch->work, &scratch->rate);
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL,
+                       HX_WITH_OPEN_CONTACTS, &scratch->work, &scratch->rate);
   hx_integral_rates_fill(model, &state->contact, &scratch->work, rate);
 }
 
@@ -223,8 +222,8 @@ static void kernel_accelerations(const hxModel *model, const hxState *state,
                                  double multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
                                  double drive_torque[HX_BODIES - 1]) {
   hxScratch *scratch = memory;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL, 1,
-                       &scratch->work, &scratch->rate);
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, NULL,
+                       HX_WITH_MULTIPLIERS, &scratch->work, &scratch->rate);
   hx_accelerations_fill(&scratch->work, &scratch->rate.motion, acceleration, multiplier,
                         drive_torque);
 }

@@ -293,8 +293,8 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     const hxKnown known = {i > 0 ? NULL : &state->moment, start->scratch->nodes,
                            i == 0 && start->scratch->is_soil_known ? start->scratch->soil.from
                                                                    : NULL};
-    hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? y : start->y, &known, stage, 0,
-                         work, &k[i]);
+    hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? y : start->y, &known, stage,
+                         HX_RATES, work, &k[i]);
     hx_add_impulses(model, command, stage, work, h * m->b[i], &trial->impulses);
     state->evaluations += 1.0;
   }

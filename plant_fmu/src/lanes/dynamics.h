@@ -447,9 +447,8 @@ static inline void hx_add_impulses(const hxModel *model, const hxCommand *comman
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const hxJointWork *k = &leg->joint[joint];
       hxReal motor = k->servo.torque, gear = k->servo.friction;
-      if (implicit &&
-          model->servo_mode != HX_SERVO_KINEMATIC) { /* the torque of a kinematic drive is a
-                                                        multiplier, which contains these parts */
+      /* the torque of a kinematic drive is a multiplier, which contains these parts */
+      if (implicit && model->servo_mode != HX_SERVO_KINEMATIC) {
         const double z = implicit->z;
         const hxReal angle_shift = k->angle_shift + (z * z) * k->qdd,
                      speed_shift = k->speed_shift + z * k->qdd;
@@ -471,17 +470,20 @@ static inline void hx_add_impulses(const hxModel *model, const hxCommand *comman
   }
 }
 
-/* Evaluates the equations of motion at (t, y): fills work, and stores dy/dt in rate. With
- * implicit, rate is k/h of that stage (eq. 19) instead. The multipliers are computed on request,
- * and always in kinematic mode. `known`: what is known of the motion, or NULL. */
+/* What an evaluation computes: dy/dt; the multipliers (in kinematic mode always); open contacts */
+typedef enum { HX_RATES, HX_WITH_MULTIPLIERS, HX_WITH_OPEN_CONTACTS } hxWanted;
+
+/* Evaluates the equations of motion at (t, y): fills work, and stores dy/dt in rate; with implicit,
+ * k/h of that stage (eq. 19) instead. known: what is known of the motion, or NULL. */
 static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact,
                                  const hxCommand *command, double t, const hxPlantMotion *motion,
-                                 const hxKnown *known, hxImplicit *implicit, int multipliers,
+                                 const hxKnown *known, hxImplicit *implicit, hxWanted wanted,
                                  hxWork *work, hxRate *rate) {
   hxInertia6 I[HX_PACKS];
   hxForce6 p[HX_PACKS];
-  const int reactions = multipliers || model->servo_mode == HX_SERVO_KINEMATIC;
-  hx_dynamics_forces(model, contact, command, t, motion, known, reactions, multipliers, work);
+  const int reactions = wanted != HX_RATES || model->servo_mode == HX_SERVO_KINEMATIC;
+  hx_dynamics_forces(model, contact, command, t, motion, known, reactions,
+                     wanted == HX_WITH_OPEN_CONTACTS, work);
   /* the stage's response to the shifts (eq. 20, 21) */
   for (int pack = 0; implicit && pack < HX_PACKS; ++pack) {
     if (!implicit->change) keep_slopes(model, contact, pack, &work->pack[pack], implicit);

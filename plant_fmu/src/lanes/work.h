@@ -49,8 +49,7 @@ typedef struct {
   hxJointWork joint[HX_JOINTS];
   int rows, row[HX_TIBIA_ROWS]; /* rows of contacts that this evaluation computes */
   hxContactWork contact[HX_TIBIA_ROWS];
-  hxForce6 by_legs[HX_LINES]; /* of other legs on femur and tibia, about their centres of mass; set
-                               * where contacts between legs are computed */
+  hxForce6 by_legs[HX_LINES]; /* of other legs, about the centres of mass; set if legs may touch */
 } hxLegWork;
 
 enum { HX_TORSO_PACKS = HX_SLOTS / HX_LANES }; /* packs that hold all contacts of the torso */

@@ -105,18 +105,11 @@ static inline double hx_force_laws_needed(const hxForceLawsModel *model, const h
 
 /* ----------------------------------------------------------------------------------- contacts */
 
-/* Returns the number of marked legs. */
-static inline int marks(const int marked[HX_LEGS]) {
-  int count = 0;
-  for (int leg = 0; leg < HX_LEGS; ++leg) count += marked[leg];
-  return count;
-}
-
 /* Replaces the forces of sensors that are not trusted (C34). */
 static inline void replace_forces(const hxForceLawsModel *model, const hxLoadPlan *plan,
                                   double force[HX_LEGS][3], hxForceLaws *laws) {
   const hxShares *shares = &plan->shares;
-  const int count = marks(laws->doubted);
+  const int count = hx_marked(laws->doubted);
   int before[HX_LEGS];
   memcpy(before, laws->contact, sizeof before);
   memcpy(laws->contact, laws->felt, sizeof laws->contact);
@@ -279,7 +272,7 @@ static inline void update_weight(const hxForceLawsModel *model, const hxLoadPlan
     laws->trusted_weight_ratio = laws->limit.weight_ratio;
     laws->trusted_lean = laws->lean;
   }
-  if (!marks(laws->doubted)) {
+  if (!hx_marked(laws->doubted)) {
     laws->scale += model->follow_weight * (scale - laws->scale);
     hx_load_limit_weigh(&model->limit, ratio, &laws->limit);
     update_lean(model, plan, normal, total, laws);

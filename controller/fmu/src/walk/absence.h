@@ -27,7 +27,7 @@ static const double swift = 0.6, low_step = 0.6;
 static const double shift_time = 0.4; /* s  in which the torso moves over the other feet */
 /* s  in which the walk then takes the torso back to its path */
 static const double back_time = 3.0;
-static const double far_shift = 0.045; /* m  at most */
+static const double far_shift = 0.045; /* m  at most for each lost leg */
 static const double fold_speed = 4.0;  /* rad/s */
 static const double lead = 0.15;       /* rad  of a command before its joint, at most */
 /* rad  from its place, at which a faulty joint has another one */
@@ -40,10 +40,9 @@ static const double arrived = 1e-3;     /* rad  a command this near to the plan 
 /* Changes a gait to the wave of the legs that are not absent, if any is absent. */
 HX_RARE void hx_gait_without(hxGait *gait, const int absent[HX_LEGS], int backwards) {
   const hxGait wave = {.pattern = HX_PATTERN_WAVE};
+  const int count = HX_LEGS - hx_marked(absent);
   double phase[HX_LEGS];
-  int count = 0;
   hx_gait_offsets(&wave, phase);
-  for (int leg = 0; leg < HX_LEGS; ++leg) count += !absent[leg];
   if (count == HX_LEGS) return;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int place = 0; /* of the leg in the order in which the feet lift off */
@@ -51,8 +50,7 @@ HX_RARE void hx_gait_without(hxGait *gait, const int absent[HX_LEGS], int backwa
       place += !absent[k] && (backwards ? phase[k] < phase[leg] : phase[k] > phase[leg]);
     gait->offset[leg] = absent[leg] || place == 0 ? 0.0 : 1.0 - (double)place / count;
   }
-  /* an absent leg gives up its load while it stands by the clock: the one opposite it steps first
-   */
+  /* an absent leg gives up its load while it stands: the leg opposite it steps first */
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const int opposite = HX_LEGS - 1 - leg;
     const double phase_of_it = absent[opposite] ? 0.0 : gait->offset[opposite];
@@ -123,8 +121,9 @@ static inline hxPlane mean_of(const hxPlane place[HX_LEGS], const int out[HX_LEG
 HX_RARE void set_absent(const hxAbsenceModel *model, const int legs[HX_LEGS], hxAbsence *absence) {
   const hxPlane begin = hx_absence_torso(model, absence, 0),
                 goal = hx_plane_sub(mean_of(model->home, legs), mean_of(model->home, NULL));
+  const double most = far_shift * hx_larger(hx_marked(legs), 1);
   absence->begin = begin;
-  absence->goal = hx_scaled(goal, far_shift / hx_larger(hx_length(goal), far_shift));
+  absence->goal = hx_scaled(goal, most / hx_larger(hx_length(goal), most));
   memcpy(absence->gone, absence->legs, sizeof absence->gone);
   memcpy(absence->legs, legs, sizeof absence->legs);
   absence->since = 0;

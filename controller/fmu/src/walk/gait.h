@@ -21,6 +21,13 @@ static const hxTiming timings[] = {
 static const int around_to_legs[HX_LEGS] = {
     5, 4, 3, 0, 1, 2}; /* LF LM LR RF RM RR in the order around the robot */
 
+/* Returns the number of marked legs. */
+static inline int hx_marked(const int marked[HX_LEGS]) {
+  int count = 0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) count += marked[leg];
+  return count;
+}
+
 /* Computes the phase offsets of a gait's legs, in [0, 1) for named gaits. */
 static inline void hx_gait_offsets(const hxGait *gait, double offset[HX_LEGS]) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {

@@ -129,7 +129,7 @@ static inline void hx_gait_clock_begin_section(const hxGaitClockModel *model, in
     clock->standing[leg] = hx_gait_clock_serves(model, clock, leg, clock->before + 1);
     clock->lifted[leg] = stood && !clock->standing[leg] && !clock->absent[leg];
     clock->stayed[leg] |= clock->lifted[leg];
-    clock->swinging[leg] &= !clock->standing[leg] && !clock->absent[leg];
+    clock->swinging[leg] &= (!clock->standing[leg] || clock->dropped[leg]) && !clock->absent[leg];
     clock->stays[leg] = 0;
   }
 }
