@@ -128,7 +128,7 @@ class FootPaths(Stateful):
     def _place_feet(self, feet: PlannedFeet, tau: Array, carried: Plane) -> PlannedFeet:
         """Computes positions and velocities of feet with known goals and pulls (C5 to C8).
 
-        tau: (6,) completed parts of the swings; carried: (6,) feet a step earlier, ground frame [m].
+        tau: (6,) completed parts of swings; carried: (6,) feet a step earlier, ground frame [m].
         """
         clock, gait, away = self.clock, self.gait, self.clock.absent
         absent = some(away)
