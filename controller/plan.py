@@ -242,7 +242,7 @@ class WalkPlan(Stateful):
     def centres(self) -> Array:
         """Returns the planned centres of the feet (6, 3), rolling, not lowered, torso frame [m]."""
         now = self.now
-        plane, height = now.posture.to_torso(now.plane + now.shift, now.feet.height)
+        plane, height = now.posture.to_torso(now.plane, now.feet.height)
         return rows_of(plane.real, plane.imag, height)
 
     def feet(self) -> Feet:
@@ -250,7 +250,7 @@ class WalkPlan(Stateful):
         now = self.now
         return now.posture.feet_to_torso(
             Feet(
-                plane=now.plane + now.shift,
+                plane=now.plane,
                 height=now.height,
                 velocity=now.feet.velocity - self._rate_of("torso") + self._rate_of("shift"),
                 rise=now.feet.rise - self._rate_of("lowering"),
@@ -284,7 +284,7 @@ class WalkPlan(Stateful):
         assert compliant is not None
         ratio = self.planner.weight_ratio()
         demand = compliant.dynamics.demand(self.motion(), speed, now.posture, ratio)
-        feet, height, rise = now.plane + now.shift, self.lift(), now.feet.rise
+        feet, height, rise = now.plane, self.lift(), now.feet.rise
         load = compliant.plan(demand, now.activation, clock, feet=feet, height=height, rise=rise)
         return PresentStep(
             load=load,

@@ -87,7 +87,7 @@ class Health(Stateful):
         low = -self.most * clamp(1.0 + load, 0.0, 1.0)
         high = self.most * clamp(1.0 - load, 0.0, 1.0)
         goal = command.angle_ref + self.period * clamp(command.speed_ref, -fastest, fastest)
-        if self.goal is not None:
+        if self.goal is not None and self.way < math.inf:
             goal = clamp(goal, self.goal - self.way, self.goal + self.way)
         self.goal = goal
         torque = self.stiffness * (goal - angle) + command.torque_ref - self.drag * speed

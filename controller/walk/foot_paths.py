@@ -264,9 +264,10 @@ class FootPaths(Stateful):
         free = clock.swinging & (tau < FREEZE)
         if number == 1:
             free = free | (clock.swinging & clock.lifted)  # every foot is aimed once
-        goal = np.where(free, way + cis(turn) * self._landing(tau, twist), before.goal)
-        left = np.maximum(1.0 - before.blend, NEARLY_DONE)
-        pull = before.pull + (goal - before.goal) / left
+        goal, pull, left = before.goal, before.pull, np.maximum(1.0 - before.blend, NEARLY_DONE)
+        if some(free):
+            goal = np.where(free, way + cis(turn) * self._landing(tau, twist), before.goal)
+            pull = before.pull + (goal - before.goal) / left
         fixed, ground = self.met | clock.dropped, self._ground_of(before)
         if some(fixed):  # a foot stays where it met the ground (C51), or is dropped
             goal, pull = np.where(fixed, ground, goal), np.where(fixed, 0.0, pull)
