@@ -23,7 +23,7 @@ from hexapod_cosim.controller.comply.paper import Paper, Step
 from hexapod_cosim.controller.gains import Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plan import WalkPlan
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, rows_of
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, some
 from hexapod_cosim.controller.sense.health import Health
 from hexapod_cosim.controller.signals import Diagnostics, JointCommand, Measurement
 from hexapod_cosim.controller.walk.absence import gait_without
@@ -37,6 +37,7 @@ from hexapod_cosim.models import Robot
 from hexapod_cosim.models.errors import check_type
 
 ALL_PARTS = Parts()
+STILL: Plane = np.zeros(LEGS, dtype=np.complex128)  # m    no correction along the ground
 CLOCK_TOLERANCE = 0.01  # 1    of a period, between the time given and the steps counted
 
 
@@ -136,17 +137,17 @@ class Controller(Stateful):
         force = sense(measurement, LEVEL)
         lifted = plan.paths.clock.swinging & (plan.now.feet.rise > 0.0)
         health.step(measurement.angle, force, self._out, lifted)
-        if plan.lose(health.lost, health.bearing, self._out):
+        if some(health.faulty) and plan.lose(health.lost, health.bearing, self._out):
             self._change()
 
     def _fold(self, measurement: Measurement) -> None:
         """Folds legs out of service away, and takes back one that works again (C58)."""
         absence, health = self.plan.absence, self.health
-        if not absence.legs.any():
+        if not some(absence.legs):
             return
         there = absence.fold(measurement.angle, health.faulty, health.locked, self._out)
         self.diagnostics.unreachable[...] &= ~absence.legs
-        if there.any() and self._returning_leg is None:
+        if some(there) and self._returning_leg is None:
             self._change(int(np.argmax(there)))
 
     def change_control(self, gains: Gains | None, law: str = "compliant") -> None:
@@ -168,7 +169,7 @@ class Controller(Stateful):
             return
         self.plan.carry(plan)
         self.fade.begin(self._out)
-        self._show(np.zeros((LEGS, 3)), NO_LEG)
+        self._show(STILL, np.zeros(LEGS), NO_LEG)
         self.diagnostics.doubted[...] = False
 
     # --------------------------------------------------------------------------------- joints
@@ -205,14 +206,13 @@ class Controller(Stateful):
         joints = paper.actuate(feet)
         out.angle_ref[...], out.speed_ref[...] = joints.angle, joints.speed
         shown.unreachable[...] = joints.unreachable
-        self._show(rows_of(paper.shift.real, paper.shift.imag, paper.lift), NO_LEG)
+        self._show(paper.shift, paper.lift, NO_LEG)
 
-    def _show(self, shift: Array, fallback: Mask) -> None:
-        """Copies corrections of the feet (6, 3) [m] and fallbacks (6,) into the diagnostics."""
+    def _show(self, shift: Plane, lift: Array, fallback: Mask) -> None:
+        """Copies corrections of the feet (6,) [m] and fallbacks (6,) into the diagnostics."""
         shown = self.diagnostics
-        shown.shift[...], shown.lift[...] = shift[:, 0] + 1j * shift[:, 1], shift[:, 2]
-        shown.fallback[...] = fallback
-        self._shown = shift, fallback
+        shown.shift[...], shown.lift[...], shown.fallback[...] = shift, lift, fallback
+        self._shown = shift, lift, fallback
 
     # ---------------------------------------------------------------------------------- steps
 
@@ -225,7 +225,7 @@ class Controller(Stateful):
             if part is not None:
                 part.reset()
         self._start, self._count, self._next = None, 0, None
-        self._shown = np.zeros((LEGS, 3)), NO_LEG
+        self._shown = STILL, np.zeros(LEGS), NO_LEG
         self._follow_paths()
 
     def save(self) -> dict[str, Any]:
@@ -305,6 +305,5 @@ class Controller(Stateful):
         if self.compliant is not None:
             step = self.plan.present_step(self._out.speed_ref)
             raised = self.compliant.step(step, measurement, self._out)
-            still = np.zeros(LEGS)
-            self._show(rows_of(still, still, raised), self.compliant.laws.fallback)
+            self._show(STILL, raised, self.compliant.laws.fallback)
             self.diagnostics.doubted[...] = self.compliant.laws.doubted

@@ -17,7 +17,7 @@ import numpy as np
 from hexapod_cosim.controller.comply.compliant import Compliant, PresentStep
 from hexapod_cosim.controller.gains import Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, rows_of
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, rows_of, some
 from hexapod_cosim.controller.planned_step import PlannedStep, StepPlanner
 from hexapod_cosim.controller.signals import JointCommand
 from hexapod_cosim.controller.walk.absence import Absence
@@ -172,7 +172,7 @@ class WalkPlan(Stateful):
         self.absence.since += 1
         number = self.at + 1
         reached, planned = clock.reach(number), number <= self.last
-        reached = reached and not self.paths.down(self.now.feet).any()
+        reached = reached and not some(self.paths.down(self.now.feet))
         self.cut = planned and not reached
         if reached and planned:
             self.after = self._plan_step(number, self.now)
@@ -197,9 +197,9 @@ class WalkPlan(Stateful):
         """
         clock, absence = self.paths.clock, self.absence
         waits = lost & bearing & ~clock.swinging & ~absence.legs
-        waits = waits & (absence.has_room() and (clock.swinging & ~lost).any())
+        waits = waits & (absence.has_room() and some(clock.swinging & ~lost))
         new = absence.change(lost & ~waits, out)
-        if new or (waits.any() and not clock.dropped.any()):
+        if new or (some(waits) and not some(clock.dropped)):
             clock.absent = absence.legs
             self.end()
             clock.drop()
@@ -242,7 +242,7 @@ class WalkPlan(Stateful):
     def centres(self) -> Array:
         """Returns the planned centres of the feet (6, 3), rolling, not lowered, torso frame [m]."""
         now = self.now
-        plane, height = now.posture.to_torso(now.plane + now.shift, now.feet.height)
+        plane, height = now.posture.to_torso(now.plane, now.feet.height)
         return rows_of(plane.real, plane.imag, height)
 
     def feet(self) -> Feet:
@@ -250,7 +250,7 @@ class WalkPlan(Stateful):
         now = self.now
         return now.posture.feet_to_torso(
             Feet(
-                plane=now.plane + now.shift,
+                plane=now.plane,
                 height=now.height,
                 velocity=now.feet.velocity - self._rate_of("torso") + self._rate_of("shift"),
                 rise=now.feet.rise - self._rate_of("lowering"),
@@ -284,7 +284,7 @@ class WalkPlan(Stateful):
         assert compliant is not None
         ratio = self.planner.weight_ratio()
         demand = compliant.dynamics.demand(self.motion(), speed, now.posture, ratio)
-        feet, height, rise = now.plane + now.shift, self.lift(), now.feet.rise
+        feet, height, rise = now.plane, self.lift(), now.feet.rise
         load = compliant.plan(demand, now.activation, clock, feet=feet, height=height, rise=rise)
         return PresentStep(
             load=load,

@@ -40,7 +40,19 @@ def cis(angle: Any) -> Any:
     """Returns e^(i angle) of an angle [rad], a number or an array."""
     if isinstance(angle, float):
         return complex(math.cos(angle), math.sin(angle))
-    return np.cos(angle) + 1j * np.sin(angle)
+    return plane_of(np.cos(angle), np.sin(angle))
+
+
+def plane_of(x: Array, y: Any) -> Plane:
+    """Returns x + i y of an array x and an array of its shape, or a number, y."""
+    plane = np.empty(x.shape, dtype=np.complex128)
+    plane.real, plane.imag = x, y
+    return plane
+
+
+def some(values: Array | Mask) -> bool:
+    """Returns whether some value is not 0; on small arrays faster than values.any()."""
+    return bool(np.count_nonzero(values))
 
 
 def rows_of(x: Array, y: Array, z: Array) -> Array:

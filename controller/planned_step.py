@@ -28,7 +28,7 @@ class PlannedStep(NamedTuple):
     posture: Posture
     feet: PlannedFeet
     torso: complex  # m    way of the torso from its nominal place (C54)
-    plane: Plane  # m    of the feet from the torso
+    plane: Plane  # m    of the feet from the torso, rolling
     activation: Array  # 1    of the legs
     lowering: Array  # m    lowering of the feet by the indentation of the ground (C21)
     height: Array  # m    of the lowered feet
@@ -94,7 +94,7 @@ class StepPlanner:
             posture=posture,
             feet=feet,
             torso=torso,
-            plane=plane,
+            plane=plane + shift,
             activation=activation,
             lowering=lowering,
             height=height,

@@ -25,7 +25,7 @@ from hexapod_cosim.controller.comply.planned_squeeze import PlannedSqueeze
 from hexapod_cosim.controller.comply.support import Support
 from hexapod_cosim.controller.gains import Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis, clamp
+from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis, clamp, plane_of
 from hexapod_cosim.controller.sense.load_adaptation import LoadAdaptation
 from hexapod_cosim.controller.signals import JointCommand, Measurement
 from hexapod_cosim.controller.walk.gait import Gait
@@ -170,11 +170,9 @@ class Compliant(Stateful):
         phase: (6,) of the legs [1]; plane: (6,) feet x + i y, walking frame [m]; clock: of the
         gait, in the section of the step; presence: (6,) factors of the legs [1].
         """
-        activation = self.support.activation(
-            phase, clock.stayed, clock.stays, walking=clock.walking
-        )
-        activation = np.where(clock.awaited, 0.0, activation * presence)
-        return activation, self.support.lowering(plane, activation)
+        active = self.support.activation(phase, clock.stayed, clock.stays, walking=clock.walking)
+        active = np.where(clock.awaited, 0.0, active * presence)
+        return active, self.support.lowering(plane, active)
 
     # ------------------------------------------------------------------------------- steering
 
@@ -213,7 +211,7 @@ class Compliant(Stateful):
         legs, angle = self.legs, measurement.angle
         w, x, y, z = measurement.quaternion.tolist()
         foot = legs.forward(angle)
-        plane, height = present.posture.turn(foot[:, 0] + 1j * foot[:, 1], foot[:, 2])
+        plane, height = present.posture.turn(plane_of(*foot.T[:2]), foot[:, 2])
         rolls = legs.rolling(angle) - present.rolled
         rolled = cis(legs.hip_yaw + angle[:, 0]) * rolls
         vx, vy, yaw_rate, commanded_height, roll, pitch = present.value.tolist()

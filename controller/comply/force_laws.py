@@ -22,7 +22,7 @@ import numpy as np
 from hexapod_cosim.controller.comply.load_plan import LoadPlan
 from hexapod_cosim.controller.gains import TRIPOD_LEGS, Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, along, clamp, square
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, along, clamp, plane_of, some
 from hexapod_cosim.controller.sense.contact_detection import ContactDetector
 from hexapod_cosim.controller.sense.load_limit import LoadLimit
 from hexapod_cosim.controller.sense.touchdown import EARLY, REACH_LIMIT, Landings, Touchdown
@@ -91,13 +91,12 @@ class ForceLaws(Stateful):
         self.watch = SensorWatch(weight, cycle=cycle, period=period)
         self.touchdown = Touchdown(period=period)
         time = gains.support.weight_time
-        most = gains.limits.torque
-        self.limit = LoadLimit(most=most, cycle=cycle, period=period, weight_time=time)
+        self.most = gains.limits.torque  # N m
+        self.limit = LoadLimit(most=self.most, cycle=cycle, period=period, weight_time=time)
         self.trust = Trust(cycle=cycle, period=period, load_time=gains.support.load_time)
         self.follow_load = 1.0 - math.exp(-period / gains.support.load_time)
         self.follow_cycle = 1.0 - math.exp(-period / cycle)
         self.follow_weight = 1.0 - math.exp(-period / gains.support.weight_time)
-        self.most = gains.limits.torque  # N m
         self.reset()
 
     def reset(self) -> None:
@@ -122,7 +121,7 @@ class ForceLaws(Stateful):
     def _replace_forces(self, plan: LoadPlan, force: Array) -> Array:
         """Returns the forces (6, 3) [N], with those of doubted sensors replaced (C34)."""
         before, self.contact = self.contact, self.detector.contact
-        if not self.doubted.any():
+        if not some(self.doubted):
             return force
         force = replaced(force, self.scale * plan.shares.forces(), self.contact, self.doubted)
         found = self.watch.found(force[:, 2], before)
@@ -130,12 +129,13 @@ class ForceLaws(Stateful):
         self.contact = np.where(self.doubted, found, self.contact)
         return force
 
-    def _judge_sensors(self, plan: LoadPlan, met: Array, force: Array, reported: Array) -> None:
+    def _judge_sensors(self, plan: LoadPlan, met: Array, force: Array, measured: Array) -> None:
         """Decides which sensors are doubted (C34): all of them once a tripod's are.
 
         met: (6,) heights at which the feet are expected to meet the ground [m]; force: (6, 3) that
-        the laws use; reported: (6,) normal forces that the sensors report [N].
+        the laws use; measured: (6,) normal forces of the sensors [N].
         """
+        reported = np.where(self.detector.contact, measured, 0.0)
         high = plan.height > self.high + met
         most = np.maximum(self.share, LIKELY * self.scale * plan.shares.normal)
         known = float(np.minimum(force[:, 2], most)[self.doubted & ~high].sum())
@@ -147,7 +147,7 @@ class ForceLaws(Stateful):
         all_doubted = np.count_nonzero(doubted) >= TRIPOD_LEGS
         doubted = doubted | all_doubted
         fresh = doubted & ~self.doubted
-        if fresh.any():
+        if some(fresh):
             self.scale, self.lean, self.limit.weight_ratio = self.trusted
         self.open_loop = (self.open_loop | fresh) & doubted & (plan.height <= EARLY) | all_doubted
         self.doubted = doubted
@@ -162,11 +162,11 @@ class ForceLaws(Stateful):
             self.contact, falling, plan.swinging, plan.standing, searching, self.open_loop
         )
 
-    def _examine_contacts(self, plan: LoadPlan, force: Array, reported: Array) -> None:
+    def _examine_contacts(self, plan: LoadPlan, force: Array, measured: Array) -> None:
         """Decides between a wrong sensor and an early or late contact; as _judge_sensors()."""
         met = self.landings.expected(self.contact, plan.height, plan.swinging)
         if self.parts.fallback:
-            self._judge_sensors(plan, met, force, reported)
+            self._judge_sensors(plan, met, force, measured)
         if self.trust.level < 1.0:
             self.touchdown.reset()
         elif self.parts.touchdown:
@@ -175,7 +175,7 @@ class ForceLaws(Stateful):
     def _contacts_differ(self, plan: LoadPlan) -> bool:
         """Returns whether contacts contradict the plan, or a response to it is still under way."""
         wrong = (self.contact != plan.standing) & (plan.standing | (plan.height > EARLY))
-        return bool((wrong | plan.awaited).any()) or self.watch.busy() or self.touchdown.busy()
+        return some(wrong | plan.awaited) or self.watch.busy() or self.touchdown.busy()
 
     # ------------------------------------------------------------------------ inputs and weight
 
@@ -185,7 +185,7 @@ class ForceLaws(Stateful):
         deviation: (6,) of the tangential forces from the planned ones [N].
         """
         planned = np.where(self.contact, self.scale * plan.shares.squeeze, 0.0)
-        whole = float(square(planned).sum())
+        whole = float(along(planned, planned).sum())
         if whole <= LOAD_FLOOR:
             return 0.0
         return min(max(-float(along(planned, deviation).sum()) / whole, 0.0), 1.0)
@@ -196,7 +196,7 @@ class ForceLaws(Stateful):
         It updates trust (C33), smoothed loads (C27) and the held share of the planned squeeze (C52)
         by the deviations of the tangential forces (C24).
         """
-        horizontal = force[:, 0] + 1j * force[:, 1]
+        horizontal = plane_of(*force.T[:2])
         deviation = np.where(self.contact, horizontal - self.scale * plan.shares.push, 0.0)
         normal = np.where(self.contact, force[:, 2], 0.0)
         total = float(normal.sum())
@@ -229,9 +229,9 @@ class ForceLaws(Stateful):
 
         normal: (6,) measured normal forces [N]; total: their sum [N].
         """
-        if self.scale > WEIGHED * self.limit.weight_ratio and not self.watch.contradicted.any():
+        if self.scale > WEIGHED * self.limit.weight_ratio and not some(self.watch.contradicted):
             self.trusted = self.scale, self.lean, self.limit.weight_ratio
-        if not self.doubted.any():
+        if not some(self.doubted):
             ratio = total / max(plan.weight, LOAD_FLOOR)
             scale = min(max(ratio, LEAST_SCALE), LARGEST_SCALE)
             self.scale += self.follow_weight * (scale - self.scale)
@@ -249,7 +249,7 @@ class ForceLaws(Stateful):
         """
         grip = self.grip + self.follow_load * (1.0 - self.grip)
         self.grip = np.where((plan.standing | plan.awaited) & ~self.contact, 0.0, grip)
-        self.regaining = bool((self.grip < GRIPPED).any())
+        self.regaining = some(self.grip < GRIPPED)
         return torque * self.grip[:, None]
 
     def _actuate(self, plan: LoadPlan) -> None:
@@ -278,19 +278,20 @@ class ForceLaws(Stateful):
             return False
         found = self.carrying if waiting else self.contact
         hopeful = self.touchdown.offset > -REACH_LIMIT
-        return bool((landing & ~found & ~self.open_loop & hopeful).any())
+        return some(landing & ~found & ~self.open_loop & hopeful)
 
     def step(self, plan: LoadPlan, force: Array) -> None:
         """Advances all laws by one period.
 
         force: (6, 3) of the ground on the feet, walking frame [N].
         """
-        reported = np.where(self.detector.step(force[:, 2]), force[:, 2], 0.0)
+        measured = force[:, 2]
+        self.detector.step(measured)
         force = self._replace_forces(plan, force)
         self.carrying = self.contact & (force[:, 2] > CARRYING_SHARE * self.share)
         self.landings.update(self.contact, plan.height, plan.swinging)
         if self._contacts_differ(plan):
-            self._examine_contacts(plan, force, reported)
+            self._examine_contacts(plan, force, measured)
         normal, total = self._measure_loads(plan, force)
         self._update_weight(plan, normal, total)
         self._actuate(plan)

@@ -22,7 +22,7 @@ import numpy as np
 from hexapod_cosim.controller.comply.load_plan import LEAST_LOAD, indentation
 from hexapod_cosim.controller.gains import Gains, Parts
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, along, clamp, square
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, along, clamp, plane_of, square
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.kinematics import Feet, Joints, LegSolver, Pose, Softness
 from hexapod_cosim.models import Robot
@@ -65,9 +65,7 @@ class Paper(Stateful):
         shift, lift: (6,) corrections of the feet, torso frame, x + i y and z [m].
     """
 
-    STATE = (
-        "force", "weight", "back", "sag", "lifted", "yielded", "late", "shift", "lift",
-    )  # fmt: skip
+    STATE = ("force", "weight", "back", "sag", "lifted", "yielded", "late", "shift", "lift")
 
     def __init__(
         self,
@@ -107,7 +105,7 @@ class Paper(Stateful):
         if total <= LEAST_LOAD:
             return
         found = self.legs.forward(step.angle) - step.planned
-        feet, part = step.planned[:, 0] + 1j * step.planned[:, 1], weight / total
+        feet, part = plane_of(*step.planned.T[:2]), weight / total
         sunk = found[:, 2] - self.yielded + indentation(load, self.ground)
         centre, mean = part @ feet, float(part @ sunk)
         # least squares: slope g of sum part (Re(arm^* g) - (sunk - mean))^2
@@ -121,7 +119,7 @@ class Paper(Stateful):
         now = mean - along(centre, slope)
         self.sag = (height + self.smoothing * (now - height), old + self.smoothing * (slope - old))
         if self.parts.paper_pid:
-            astray = complex(part @ (found[:, 0] + 1j * found[:, 1]))
+            astray = complex(part @ plane_of(*found.T[:2]))
             back = self.back - self.period * self.gains.return_rate * astray
             self.back = back * (self.gains.limit / max(abs(back), self.gains.limit))
 
@@ -133,32 +131,31 @@ class Paper(Stateful):
         heading = step.pose.heading
         shift = -self.share * soft.splay * borne * heading
         if self.parts.paper_pid:
-            pull = (self.force[:, 0] + 1j * self.force[:, 1]) * heading.conj()
+            pull = plane_of(*self.force.T[:2]) * heading.conj()
             # a standing foot keeps the outward force, which carries a part of the weight
             outward = np.where(step.swinging, soft.outward * pull.real, 0.0)
             sideward = soft.sideward * pull.imag
-            shift = shift + self.gains.yield_share * (outward + 1j * sideward) * heading
+            shift = shift + self.gains.yield_share * plane_of(outward, sideward) * heading
         return np.asarray(shift + self.back)
 
     def _lift_swinging(self, step: Step) -> None:
         """Updates the lift of the feet in the air by the torso's sag (C48)."""
         height, slope = self.sag
-        sunk = height + along(step.planned[:, 0] + 1j * step.planned[:, 1], slope)
+        sunk = height + along(plane_of(*step.planned.T[:2]), slope)
         wanted = clamp(sunk, -self.gains.sag_limit, self.gains.sag_limit)
         raised = self.lifted + self.smoothing * (wanted - self.lifted)
         self.lifted = np.where(step.swinging, raised, self.landed * self.lifted)
 
     def _suspend(self, step: Step, total: float) -> None:
         """Updates the deflections of the suspensions (C48). total: of the normal forces [N]."""
-        h = self.period
         contact = step.force[:, 2] > max(CONTACT_PART * self.weight, LEAST_LOAD)
         missing = ~contact & ~step.swinging & (total >= WHOLE_PART * self.weight)
-        self.late = np.where(missing, self.late + h, 0.0)
+        self.late = np.where(missing, self.late + self.period, 0.0)
         # the damper yields to the force beyond the share of a foot
         rate = (step.force[:, 2] - self.weight / LEGS) / self.gains.damping
         descent = np.where(step.height > EARLY_HEIGHT, np.maximum(-step.rise, 0.0), 0.0)
-        met = self.yielded + h * clamp(rate, 0.0, descent)
-        sought = self.yielded + h * clamp(rate, -SEARCH_SPEED, 0.0)
+        met = self.yielded + self.period * clamp(rate, 0.0, descent)
+        sought = self.yielded + self.period * clamp(rate, -SEARCH_SPEED, 0.0)
         kept = np.where(step.swinging & ~contact, self.in_air, self.on_ground)
         moved = np.where(step.swinging & contact, met, kept * self.yielded)
         moved = np.where(self.late > LATE_TIME, sought, moved)

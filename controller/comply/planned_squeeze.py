@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexapod_cosim.controller.comply.load_plan import LEAST_LOAD, Shares, solve
-from hexapod_cosim.controller.plane import Array, Plane, across, square
+from hexapod_cosim.controller.plane import Array, Plane, across, plane_of, square
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand
 
 MOST_FRICTION = 0.7  # 1    share of its friction that a foot is planned to use at most
@@ -50,7 +50,7 @@ class PlannedSqueeze:
         lever, (xx, xy, yy) = demand.lever, yielding
         left = demand.torque - lever[:, :, 2] * normal[:, None]  # for the horizontal forces
         gx, gy = (lever[:, :, 0] * left).sum(axis=1), (lever[:, :, 1] * left).sum(axis=1)
-        return np.asarray(xx * gx + xy * gy + 1j * (xy * gx + yy * gy))
+        return plane_of(xx * gx + xy * gy, xy * gx + yy * gy)
 
     def _balance(self, change: Plane, arm: Plane, yielding: Yielding) -> Plane:
         """Returns changes of forces (6,) without their sum and their moment, by multipliers.
@@ -63,8 +63,8 @@ class PlannedSqueeze:
         *system, twist = np.array((xx, xy, tx, yy, ty, turning, twists)).sum(axis=1).tolist()
         total = change.sum()
         a, b, c = solve(system, (total.real, total.imag, twist))
-        carried = xx * a + xy * b + tx * c + 1j * (xy * a + yy * b + ty * c)
-        return np.asarray(change - carried)
+        carried = plane_of(xx * a + xy * b + tx * c, xy * a + yy * b + ty * c)
+        return change - carried
 
     def _limit(self, shares: Shares, change: Plane) -> float:
         """Returns the factor on all changes (6,) that keeps each foot within its friction (C43)."""

@@ -20,7 +20,6 @@ from hexapod_cosim.models import Robot
 
 LEAST_SPREAD = 1e-4  # m2    mean square distance of the feet from their centre: below it no twist
 ONES = np.ones(LEGS)
-UPPER = np.triu_indices(3)  # of a symmetric system
 
 
 def _smooth(x: Array) -> Array:
@@ -73,8 +72,8 @@ class Support:
         """
         one = np.array([ONES, feet.real, feet.imag])
         weighted = one * activation
-        system = (weighted @ one.T)[UPPER].tolist()
-        found = solve(system, (weight, moment.real, moment.imag))
+        (s00, s01, s02), (_, s11, s12), (_, _, s22) = (weighted @ one.T).tolist()
+        found = solve((s00, s01, s02, s11, s12, s22), (weight, moment.real, moment.imag))
         return np.maximum(np.array(found) @ weighted, 0.0)
 
     def lowering(self, feet: Plane, activation: Array) -> Array:
@@ -98,4 +97,4 @@ class Support:
         if spread >= LEAST_SPREAD:
             turn = (demand.twist - across(centre, demand.push)) / spread
         push = part * (demand.push + 1j * turn * arm)
-        return Shares(activation, normal, push, np.zeros_like(push))
+        return Shares(activation, normal, push, np.zeros(LEGS, dtype=np.complex128))

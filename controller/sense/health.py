@@ -81,27 +81,27 @@ class Health(Stateful):
         self, angle: Array, force: Array, command: JointCommand, lifted: Mask
     ) -> Array:
         """Returns the torques (6, 3) of the servos' model that nothing explains [N m]."""
-        before = angle if self.angle is None else self.angle
+        before, fastest = angle if self.angle is None else self.angle, self.legs.speed_max
         speed = (angle - before) / self.period
-        load = speed / self.legs.speed_max
+        load = speed / fastest
         low = -self.most * clamp(1.0 + load, 0.0, 1.0)
         high = self.most * clamp(1.0 - load, 0.0, 1.0)
-        fastest = self.legs.speed_max
         goal = command.angle_ref + self.period * clamp(command.speed_ref, -fastest, fastest)
-        if self.goal is not None:
+        if self.goal is not None and self.way < math.inf:
             goal = clamp(goal, self.goal - self.way, self.goal + self.way)
         self.goal = goal
         torque = self.stiffness * (goal - angle) + command.torque_ref - self.drag * speed
-        damping, nothing = DAMPING_TIME * self.stiffness, np.zeros((LEGS, 3))
-        added = np.array([nothing, -damping * speed, damping * (command.speed_ref - speed)])
-        torques = clamp(torque + added, low, high)
+        damping = DAMPING_TIME * self.stiffness
+        slowed, followed = torque - damping * speed, torque + damping * (command.speed_ref - speed)
+        weakest = np.minimum(torque, np.minimum(slowed, followed))
+        strongest = np.maximum(torque, np.maximum(slowed, followed))
         # a larger load is no fault of the servo
         needed = clamp(self.legs.load_torques(angle, force), -self.most, self.most)
         free = np.where(lifted[:, None], 0.0, needed)
         spin = self.rotor / self.period * (speed - self.speed)
         self.speed = speed
-        least = torques.min(axis=0) - np.maximum(needed, free) - np.maximum(spin, 0.0)
-        most = torques.max(axis=0) - np.minimum(needed, free) - np.minimum(spin, 0.0)
+        least = clamp(weakest, low, high) - np.maximum(needed, free) - np.maximum(spin, 0.0)
+        most = clamp(strongest, low, high) - np.minimum(needed, free) - np.minimum(spin, 0.0)
         return np.asarray(np.maximum(least, 0.0) + np.minimum(most, 0.0))
 
     def step(

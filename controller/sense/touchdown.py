@@ -23,7 +23,7 @@ import math
 import numpy as np
 
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, some
 
 EARLY = 0.002  # m    a contact more than this above the expected height is early
 REACH_SPEED = 0.08  # m/s    downwards
@@ -56,7 +56,7 @@ class Touchdown(Stateful):
 
     def busy(self) -> bool:
         """Returns whether some foot has an offset or lacks its planned contact."""
-        return bool(self.offset.any() or self.late.any())
+        return some(self.offset) or some(self.late)
 
     def _faded(self) -> Array:
         """Returns the next offsets (6,) of feet that return to their paths [m]."""
@@ -134,7 +134,7 @@ class Landings(Stateful):
             swinging: (6,) legs planned in the air.
         """
         landed = contact & self.airborne
-        if landed.any():
+        if some(landed):
             self.before = np.where(landed & np.isfinite(self.met), self.met, self.before)
             now = np.where(swinging, np.maximum(height, 0.0), 0.0)
             self.met = np.where(landed, now, self.met)
@@ -143,7 +143,7 @@ class Landings(Stateful):
     def expected(self, contact: Mask, height: Array, swinging: Mask) -> Array:
         """Returns the heights (6,) at which the feet are expected to meet the ground [m] (C35).
 
-        They are 0 before the first landing. Arguments are those of look().
+        They are 0 before the first landing. Arguments are those of update().
         """
         known = np.where(swinging & ~contact, np.maximum(height, 0.0), self.met)
         return np.maximum(_least_of_others(known), self.before)

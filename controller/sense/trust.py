@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, some
 
 SLIDING_DRAG = 0.55  # 1    common tangential over normal force beyond the plan: only a robot that
 # slides exceeds it, or one on a slope of 29 degrees
@@ -99,15 +99,10 @@ class SensorWatch(Stateful):
 
     def busy(self) -> bool:
         """Returns whether some sensor contradicts the plan or is doubted."""
-        return bool(self.contradicted.any() or self.left.any())
-
-    @property
-    def doubted(self) -> Mask:
-        """Returns the sensors (6,) that are not trusted."""
-        return self.left > 0.0
+        return some(self.contradicted) or some(self.left)
 
     def update(self, contact: Mask, total: Array | float, standing: Mask, high: Mask) -> Mask:
-        """Advances the times by one period and returns `doubted`.
+        """Advances the times by one period and returns the sensors (6,) that are not trusted.
 
         Args:
             contact: (6,) feet that report a force.
@@ -121,7 +116,7 @@ class SensorWatch(Stateful):
         self.contradicted = np.where(wrong, self.contradicted + self.period, 0.0)
         rest = np.maximum(self.left - self.period, 0.0)
         self.left = np.where(self.contradicted > CONTRADICTION_TIME, self.memory, rest)
-        return self.doubted
+        return self.left > 0.0
 
     def found(self, load: Array, contact: Mask) -> Mask:
         """Returns which feet (6,) have contact if their sensors are doubted (C34).

@@ -118,9 +118,7 @@ class Absence(Stateful):
 
     def take_back(self, leg: int) -> None:
         """Takes a leg back into service."""
-        legs = self.legs.copy()
-        legs[leg] = False
-        self._set(legs)
+        self._set(self.legs & (np.arange(LEGS) != leg))
 
     def _set(self, legs: Mask) -> None:
         self.begin, self.gone = self.torso(0), self.legs
@@ -133,10 +131,6 @@ class Absence(Stateful):
         """Returns the way of the torso `ahead` periods after the present step [m]."""
         x = min((self.since + ahead) * self.period / SHIFT_TIME, 1.0)
         return self.begin + (self.goal - self.begin) * (x * x * (3.0 - 2.0 * x))
-
-    def settled(self) -> bool:
-        """Returns whether the torso has reached its way."""
-        return self.since * self.period >= SHIFT_TIME
 
     def drift(self, ahead: int) -> complex:
         """Returns the velocity that leads the torso back to its path `ahead` periods later [m/s].

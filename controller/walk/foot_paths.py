@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, cis
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, cis, plane_of, some
 from hexapod_cosim.controller.walk.gait import Gait
 from hexapod_cosim.controller.walk.gait_clock import CLOCK_EPSILON, NO_LEG, GaitClock
 from hexapod_cosim.controller.walk.kinematics import LegSolver
@@ -75,7 +75,7 @@ class FootPaths(Stateful):
         # from the lift-off to the middle of the next stance
         self.landing_lead = 0.5 * gait.period * gait.duty + self.swing_time
         home = legs.forward(legs.stance)
-        self.home, self.home_height = home[:, 0] + 1j * home[:, 1], home[:, 2].copy()  # m
+        self.home, self.home_height = plane_of(*home.T[:2]), home[:, 2].copy()  # m
         # m    from the stance to the narrow stance, and rolled outwards on this way
         self.inward = -gait.narrowing * cis(legs.hip_yaw + legs.stance[:, 0])
         self.turned = legs.rolling(legs.pose(self.home + self.inward, self.home_height).angle)
@@ -125,26 +125,23 @@ class FootPaths(Stateful):
         """Returns the feet (6,) in the ground frame [m] (C5)."""
         return feet.goal - feet.pull * (1.0 - feet.blend)
 
-    def _place_feet(self, feet: PlannedFeet, carried: Plane) -> PlannedFeet:
-        """Computes positions and velocities of feet with known phases, goals and pulls (C5 to C8).
+    def _place_feet(self, feet: PlannedFeet, tau: Array, carried: Plane) -> PlannedFeet:
+        """Computes positions and velocities of feet with known goals and pulls (C5 to C8).
 
-        carried: (6,) feet at the step before, ground frame [m].
+        tau: (6,) completed parts of swings; carried: (6,) feet a step earlier, ground frame [m].
         """
-        away = self.clock.absent
-        if away.any():  # these feet are above their stance positions
+        clock, gait, away = self.clock, self.gait, self.clock.absent
+        absent = some(away)
+        if absent:  # these feet are above their stance positions
             place = feet.way + cis(feet.turn) * self.aims()
-            feet = feet._replace(
-                goal=np.where(away, place, feet.goal), pull=np.where(away, 0.0, feet.pull)
-            )
-        clock, gait = self.clock, self.gait
-        R_KW, tau = cis(-feet.turn), clock.progress(feet.phase)
+            goal, pull = np.where(away, place, feet.goal), np.where(away, 0.0, feet.pull)
+            feet = feet._replace(goal=goal, pull=pull)
+        R_KW = cis(-feet.turn)
         s, slope = blend(tau)
         lift, climb = hop(tau, top=gait.step_height, down=gait.touchdown_speed * self.swing_time)
-        folded = np.where(away, gait.step_height, 0.0)
-        # 1/s    at which the feet pass through their paths
-        pace = 0.0 if clock.waiting else 1.0 / self.swing_time
+        pace = 0.0 if clock.waiting else 1.0 / self.swing_time  # 1/s    of the feet on their paths
         rise = climb * pace
-        if clock.dropped.any():
+        if some(clock.dropped):
             high = feet.height - self.home_height
             fall = np.maximum(DROP_RATE * high, LANDING_SPEED)
             lift = np.where(clock.dropped, np.maximum(high - fall * self.period, 0.0), lift)
@@ -153,22 +150,28 @@ class FootPaths(Stateful):
         was = R_KW * (carried - feet.way)
         motion = feet.twist.velocity + 1j * feet.twist.yaw_rate * was
         velocity = R_KW * feet.pull * (slope * pace) - motion
-        feet = feet._replace(blend=np.where(clock.swinging, s, 0.0))
+        height = self.home_height + np.where(clock.swinging, lift, 0.0)
+        if absent:
+            height = np.where(away, self.home_height + gait.step_height, height)
+            velocity = np.where(away, 0.0, velocity)
+        s = np.where(clock.swinging, s, 0.0)
         return feet._replace(
-            plane=R_KW * (self._ground_of(feet) - feet.way),
-            height=self.home_height + np.where(clock.swinging, lift, folded),
-            velocity=np.where(away, 0.0, velocity),
+            plane=R_KW * (feet.goal - feet.pull * (1.0 - s) - feet.way),
+            height=height,
+            velocity=velocity,
             rise=np.where(clock.swinging, rise, 0.0),
+            blend=s,
         )
 
     def _set_out(self, now: PlannedFeet, twist: Twist) -> PlannedFeet:
         """Computes the present step again, with the legs that swing in the new section."""
         clock = self.clock
         phase = clock.phase_after(clock.before)
-        s = np.where(clock.swinging, blend(clock.progress(phase))[0], 0.0)
+        tau = clock.progress(phase)
+        s = np.where(clock.swinging, blend(tau)[0], 0.0)
         pull = np.where(clock.swinging, now.pull, 0.0)
         feet = now._replace(phase=phase, blend=s, pull=pull, twist=twist)
-        feet = self._place_feet(feet, self._ground_of(feet))
+        feet = self._place_feet(feet, tau, self._ground_of(feet))
         return feet._replace(height=np.where(clock.dropped, now.height, feet.height))
 
     def plan(self, now: PlannedFeet, number: int, *, going: bool, twist: Twist) -> PlannedFeet:
@@ -229,7 +232,7 @@ class FootPaths(Stateful):
         if returning_leg is not None:
             clock.start_at(0.5 + 0.5 * self.gait.duty + offset - offset[returning_leg])
         opposite = clock.absent[::-1] & ~clock.absent
-        able = opposite if opposite.any() else ~clock.absent
+        able = opposite if some(opposite) else ~clock.absent
         for first in np.flatnonzero(able) if returning_leg is None else ():
             begin = unloads + (offset - offset[first])
             far = self._farthest(feet, begin)
@@ -262,14 +265,17 @@ class FootPaths(Stateful):
         free = clock.swinging & (tau < FREEZE)
         if number == 1:
             free = free | (clock.swinging & clock.lifted)  # every foot is aimed once
-        goal = np.where(free, way + cis(turn) * self._landing(tau, twist), before.goal)
-        left = np.maximum(1.0 - before.blend, NEARLY_DONE)
-        pull = before.pull + (goal - before.goal) / left
-        # a foot stays where it met the ground (C51), or is dropped
+        goal, pull, left = before.goal, before.pull, np.maximum(1.0 - before.blend, NEARLY_DONE)
+        if some(free):
+            goal = np.where(free, way + cis(turn) * self._landing(tau, twist), before.goal)
+            pull = before.pull + (goal - before.goal) / left
         fixed, ground = self.met | clock.dropped, self._ground_of(before)
-        goal, pull = np.where(fixed, ground, goal), np.where(fixed, 0.0, pull)
+        if some(fixed):  # a foot stays where it met the ground (C51), or is dropped
+            goal, pull = np.where(fixed, ground, goal), np.where(fixed, 0.0, pull)
         feet = before._replace(phase=phase, goal=goal, pull=pull, way=way, turn=turn, twist=twist)
-        feet = self._place_feet(feet, ground)
+        feet = self._place_feet(feet, tau, ground)
+        if self.narrowing == 0.0 and not some(before.rolled):
+            return feet
         aim = self.narrowing * self.turned
         rolls = aim - (aim - before.rolled) * (1.0 - feet.blend) / left
         return feet._replace(rolled=np.where(clock.swinging & ~self.met, rolls, before.rolled))

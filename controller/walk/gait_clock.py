@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexapod_cosim.controller.memory import Stateful
-from hexapod_cosim.controller.plane import LEGS, Array, Mask
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, some
 from hexapod_cosim.controller.walk.gait import Gait
 
 CLOCK_EPSILON = 1e-9  # cycles    the clock starts this much before the first lift-off
@@ -169,7 +169,7 @@ class GaitClock(Stateful):
 
         number: periods since the section began.
         """
-        if not self.walking or self.dropped.any():
+        if not self.walking or some(self.dropped):
             return NO_LEG
         stands = self.phase_after(self.reached(number) + 1) < self.gait.duty
         return np.asarray(self.swinging & stands)
@@ -181,8 +181,7 @@ class GaitClock(Stateful):
         """
         if not self.walking or self.waiting or number == 1:
             return True
-        stands = self._stands_after(self.before + number)
-        return bool((stands == self.standing).all())
+        return not some(self._stands_after(self.before + number) != self.standing)
 
     def ended(self) -> bool:
         """Returns whether all legs stand and begin no other step, because another gait follows."""

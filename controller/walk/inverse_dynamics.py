@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.plane import LEGS, Array, Plane, across, cis
+from hexapod_cosim.controller.plane import LEGS, Array, Plane, across, cis, plane_of
 from hexapod_cosim.controller.walk.kinematics import LegSolver, Pose
 from hexapod_cosim.controller.walk.posture import Posture
 from hexapod_cosim.models import Robot
@@ -104,7 +104,7 @@ class InverseDynamics:
         point[:, 0] = self.com[:, 0]
         point[:, 1] = self.joint + pose.femur * self.com[:, 1]
         point[:, 2] = knee + pose.tibia * self.com[:, 2]
-        aside = point.real + 1j * self.side
+        aside = plane_of(point.real, self.side)
         place, height = posture.turn(
             legs.place[:, None] + pose.heading[:, None] * aside, legs.hip[2][:, None] + point.imag
         )
@@ -180,10 +180,10 @@ class InverseDynamics:
         torque += self.drag * speed
         # tau_1 = sum Im((u + i Y)^* F_h e^(-i psi))
         along = push * now.heading.conj()[:, None]
-        torque[:, 0] += across(point.real + 1j * self.side, along).sum(axis=1)
+        torque[:, 0] += across(plane_of(point.real, self.side), along).sum(axis=1)
         torque[:, 0] += turning[:, 0] * self.yaw_inertia
         # tau_2 = sum Im((U - U_femur)^* P)    tau_3 = -Im((U - U_knee)^* P)
-        inner = along.real + 1j * lift
+        inner = plane_of(along.real, lift)
         arm = point[:, 1:] - self.joint[:, None]
         tibia = arm[:, 1] - legs.femur * now.femur
         upper = turning[:, 1] * self.pitch_inertia[:, 1]

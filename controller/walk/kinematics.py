@@ -20,6 +20,7 @@ from hexapod_cosim.controller.plane import (
     along,
     cis,
     clamp,
+    plane_of,
     rows_of,
     square,
 )
@@ -91,7 +92,7 @@ class LegSolver:
         self.offset_y = tip[:, :, 1].sum(axis=1)  # m    (6,) Y
         self.femur = np.hypot(tip[:, 1, 0], tip[:, 1, 2])  # m    (6,) a
         self.tibia = np.hypot(tip[:, 2, 0], tip[:, 2, 2])  # m    (6,) b
-        self.squares = self.femur * self.femur, self.tibia * self.tibia  # m2    (6,)
+        self.squares = self.femur**2, self.tibia**2, self.offset_y**2  # m2    (6,) a^2, b^2, Y^2
         self.twice = 2.0 * self.femur * self.tibia  # m2    (6,)
         self.femur_tilt = np.arctan2(tip[:, 1, 2], tip[:, 1, 0])  # rad    (6,)
         self.tibia_tilt = np.arctan2(tip[:, 2, 2], tip[:, 2, 0])  # rad    (6,)
@@ -132,17 +133,17 @@ class LegSolver:
         Args:
             plane, height: (6,) centres of the feet, x + i y and z, torso frame [m].
         """
-        (a2, b2), side = self.squares, self.offset_y
+        a2, b2, side2 = self.squares
         point = plane - self.place
         # rho^2 = x^2 + y^2 - Y^2;  e^(i psi) = (x + i y)/(rho + i Y)
-        distance2 = square(point) - side * side
+        distance2 = square(point) - side2
         rho = np.sqrt(np.maximum(distance2, RADIUS_FLOOR))
-        heading = point / (rho + 1j * side)
-        foot = rho - self.coxa_length + 1j * (height - self.hip[2] - self.coxa_height)
+        heading = point / plane_of(rho, self.offset_y)
+        foot = plane_of(rho - self.coxa_length, height - self.hip[2] - self.coxa_height)
         # cos gamma = (u^2 + w^2 - a^2 - b^2)/(2 a b);  e^(i B) = (u + i w)/(b + a e^(i gamma))
         wanted = (square(foot) - a2 - b2) / self.twice
         cosine = clamp(wanted, FOLDED_COSINE, 1.0)
-        knee = cosine + 1j * np.sqrt(1.0 - cosine * cosine)
+        knee = plane_of(cosine, np.sqrt(1.0 - cosine * cosine))
         tibia = foot / (self.tibia + self.femur * knee)
         femur = tibia * knee
         angle = np.empty((*cosine.shape, 3))
@@ -160,7 +161,7 @@ class LegSolver:
         """
         v = velocity * pose.heading.conj()
         turn = v.imag / (pose.foot.real + self.coxa_length)
-        left = v.real + self.offset_y * turn + 1j * rise
+        left = plane_of(v.real + self.offset_y * turn, rise)
         sine = across(pose.tibia, pose.femur)
         lever = -self.femur * np.maximum(sine, SINGULAR_SINE)
         speed = np.empty((*turn.shape, 3))
@@ -223,9 +224,9 @@ class LegSolver:
         b = angle[:, 1] - angle[:, 2] + self.tibia_tilt
         tibia = self.tibia * cis(b)
         arm = self.femur * cis(a) + tibia  # from the femur's joint to the foot
-        plane = (force[:, 0] + 1j * force[:, 1]) * cis(-(self.hip_yaw + angle[:, 0]))
-        foot = self.coxa_length + arm.real + 1j * self.offset_y
-        inner = plane.real + 1j * force[:, 2]
+        plane = plane_of(force[:, 0], force[:, 1]) * cis(-(self.hip_yaw + angle[:, 0]))
+        foot = plane_of(self.coxa_length + arm.real, self.offset_y)
+        inner = plane_of(plane.real, force[:, 2])
         return -rows_of(across(foot, plane), across(arm, inner), -across(tibia, inner))
 
     # the design and the static checks use the following; the running controller does not

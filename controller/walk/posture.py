@@ -50,7 +50,7 @@ class Posture(NamedTuple):
     def to_torso(self, plane: Any, height: Any) -> tuple[Any, Any]:
         """Converts points (x + i y, z) [m] from the walking frame to the torso frame."""
         # p_T = R_TK (p_K - height e_z)
-        return self.turn_back(plane, height - self.height)
+        return (plane, height) if self.level else self.turn_back(plane, height - self.height)
 
     def feet_to_torso(self, feet: Feet) -> Feet:
         """Converts positions and velocities of feet from the walking frame to the torso frame."""

@@ -123,7 +123,7 @@ def test_a_standing_foot_keeps_its_place_on_the_ground(sway: bool) -> None:
         now = controller.plan.now
         ways.append(abs(now.torso))
         turn = np.exp(1j * now.feet.turn)
-        ground = now.feet.way + turn * (now.torso + now.plane)
+        ground = now.feet.way + turn * (now.torso + now.plane - now.shift)
         stands = controller.plan.paths.clock.standing & (controller.plan.at > 0)
         if last is not None:
             assert np.abs(np.where(stands, ground - last, 0.0)).max() < ROUND_OFF

@@ -277,7 +277,7 @@ static inline hxPlane rate_of_plane(const hxWalkPlan *plan, hxPlane before, hxPl
 /* Computes the centre of a foot as the command plans it: on its path, rolling, not lowered. */
 static inline void hx_walk_plan_centre(hxWalkPlan *plan, int k, double centre[3]) {
   const hxPlannedStep *now = hx_walk_plan_step(plan, 0);
-  hxPlane plane = hx_plane_add(now->plane[k], now->shift[k]);
+  hxPlane plane = now->plane[k];
   double height = now->feet.height[k];
   hx_posture_to_torso(&now->posture, &plane, &height);
   centre[0] = plane.x;
@@ -295,7 +295,7 @@ static inline void hx_walk_plan_foot(const hxWalkPlanModel *model, hxWalkPlan *p
   const hxPlane rolling =
                     rate_of_plane(plan, before->shift[k], now->shift[k], after->shift[k], period),
                 swaying = rate_of_plane(plan, before->torso, now->torso, after->torso, period);
-  *plane = hx_plane_add(now->plane[k], now->shift[k]);
+  *plane = now->plane[k];
   *velocity = hx_plane_add(hx_plane_sub(now->feet.velocity[k], swaying), rolling);
   *height = now->height[k];
   *rise = now->feet.rise[k] -
@@ -344,7 +344,7 @@ static inline void hx_walk_plan_present_step(const hxWalkPlanModel *model,
                              (const double (*)[HX_JOINTS])speed, &now->posture,
                              hx_step_planner_weight_ratio(planner, compliant), &demand);
   for (int k = 0; k < HX_LEGS; ++k) {
-    load->feet[k] = hx_plane_add(now->plane[k], now->shift[k]);
+    load->feet[k] = now->plane[k];
     height[k] = hx_walk_plan_lift(model, plan, k);
     load->shares.activation[k] = now->activation[k];
     load->swinging[k] = plan->paths.clock.swinging[k];

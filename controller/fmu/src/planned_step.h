@@ -16,7 +16,7 @@ typedef struct hxPlannedStep {
   hxPosture posture;
   hxPlannedFeet feet;
   hxPlane torso;              /* m  way of the torso from its nominal place (C54) */
-  hxPlane plane[HX_LEGS];     /* m  of the feet from the torso */
+  hxPlane plane[HX_LEGS];     /* m  of the feet from the torso, rolling */
   double activation[HX_LEGS]; /* 1 */
   double lowering[HX_LEGS];   /* m  deformation of the ground */
   double height[HX_LEGS];     /* m  of the lowered feet */
@@ -42,13 +42,12 @@ static inline void hx_step_planner_compile(const hxControllerDefinition *definit
   hx_sway_compile(definition, model->leg, &model->compliant.dynamics, &model->sway);
 }
 
-/* Computes the poses of legs whose contact points are shifted from the planned feet. */
-static inline void reach_all(const hxLegSolver leg[HX_LEGS], const hxPlane shift[HX_LEGS],
-                             hxPlannedStep *step) {
+/* Computes the poses of the legs for the feet from the torso. */
+static inline void reach_all(const hxLegSolver leg[HX_LEGS], hxPlannedStep *step) {
   hxPlane seen[HX_LEGS];
   double z[HX_LEGS];
   for (int k = 0; k < HX_LEGS; ++k) {
-    seen[k] = hx_plane_add(step->plane[k], shift[k]);
+    seen[k] = step->plane[k];
     z[k] = step->height[k];
     hx_posture_to_torso(&step->posture, &seen[k], &z[k]);
   }
@@ -60,8 +59,7 @@ static inline void reach_all(const hxLegSolver leg[HX_LEGS], const hxPlane shift
  * direction of the leg. The shift s changes B itself: s = R (C + s dC/du) is solved by one Newton
  * step. What is rolled on the way to another position than that of the stance is no shift. */
 static inline void place_legs(const hxLegSolver leg[HX_LEGS], hxPlannedStep *step) {
-  const hxPlane none[HX_LEGS] = {{0.0, 0.0}};
-  reach_all(leg, none, step);
+  reach_all(leg, step);
   for (int k = 0; k < HX_LEGS; ++k) {
     const hxPose *pose = &step->pose[k];
     double slope[HX_JOINTS];
@@ -69,8 +67,9 @@ static inline void place_legs(const hxLegSolver leg[HX_LEGS], hxPlannedStep *ste
     const double rolls = hx_leg_solver_rolling(&leg[k], pose->angle) - step->feet.rolled[k];
     step->shift[k] =
         hx_scaled(pose->heading, rolls / (1.0 - leg[k].radius * (slope[2] - slope[1])));
+    step->plane[k] = hx_plane_add(step->plane[k], step->shift[k]);
   }
-  reach_all(leg, (const hxPlane *)step->shift, step);
+  reach_all(leg, step);
 }
 
 /* Computes the poses of the legs and the point masses for a torso that has moved. presence: factors
