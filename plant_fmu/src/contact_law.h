@@ -23,8 +23,7 @@ double hx_exact_restitution_chi(double e);
 /* Opens all contacts and holds no cells. */
 void hx_contact_release(hxContactState *contact);
 
-/* Sets the contacts at the start of a motion: those in the ground are closed, with impact speed 0.
- */
+/* Sets the contacts at the start of a motion: those in the ground close with impact speed 0. */
 void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactState *contact);
 
 /* Returns whether feet stand on cells of blocks. */

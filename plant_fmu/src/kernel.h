@@ -11,15 +11,23 @@
 
 HX_HIDDEN_BEGIN
 
-/* Event handling of a call: stop = end at the first touch-down or lift-off; found = there was one.
- */
+/* What a call and its steps share: where it ends, events, what they change outside the state. */
 typedef struct hxEvents {
-  int stop;                   /* 1: a call ends at an event; 2: at the end of any step */
-  int found, ended;           /* an event; with stop = 2 a step */
+  int stop;                   /* 1: a call ends at a touch-down or lift-off; 2: after any step */
+  int found, ended;           /* whether there was such an event; with stop = 2 a step */
   const hxModel *feet;        /* the model with the rows of feet alone */
   int continues;              /* 1: a later part of a call, whose peaks stay */
+  double t_end;               /* s  of the call */
+  hxState *before;            /* for a copy of what steps change; NULL: it is made */
   hxFootprintLog *footprints; /* that feet leave in soil */
 } hxEvents;
+
+/* Keeps what steps change, once in a call, before a step that another one follows, which may fail.
+ * A call of one step fails before it changes that. */
+static inline void hx_keep_state(const hxModel *model, const hxState *state, hxEvents *events) {
+  if (events->before) hx_copy_state(model, events->before, state);
+  events->before = NULL;
+}
 
 /* Returns whether a call ends here. */
 static inline int hx_ends_here(const hxEvents *events) {

@@ -237,8 +237,7 @@ typedef struct hxDepths {
   double outside[HX_SLOTS]; /* m  how far a foot is outside of the cell that is held for it */
 } hxDepths;
 
-/* A row of contacts at one end of a step. World axes; for pairs of legs the next leg is the ground.
- */
+/* Contacts of a row at one end of a step. World axes; to pairs of legs the next leg is ground. */
 typedef struct hxContactMoment {
   double centre[3][HX_SLOTS];               /* m      centre of the sphere; of pairs the point */
   double normal[3][HX_SLOTS];               /* 1      normal of the ground */
@@ -262,15 +261,16 @@ typedef struct hxMoment {
 typedef struct hxCompleted {
   double motor[HX_JOINTS][HX_SLOTS];        /* N m  motor torques */
   double gear[HX_JOINTS][HX_SLOTS];         /* N m  gear friction */
-  double contact[HX_ROWS][3][HX_SLOTS];     /* N    ground on feet and bodies, world axes */
   double stop[HX_JOINTS][HX_SLOTS];         /* N m  stops */
   double moment[HX_FOOT_ROWS][3][HX_SLOTS]; /* N m  spin and rolling friction on tibias */
+  double contact[HX_ROWS][3][HX_SLOTS];     /* N    ground on feet and bodies, world axes */
   double known;                             /* 1    0: no step was completed yet */
 } hxCompleted;
 
 enum {
   HX_MOMENT_LINES = offsetof(hxMoment, time) / (HX_SLOTS * sizeof(double)),
-  HX_CONTACT_LINES = sizeof(hxContactMoment) / (HX_SLOTS * sizeof(double))
+  HX_CONTACT_LINES = sizeof(hxContactMoment) / (HX_SLOTS * sizeof(double)),
+  HX_COMPLETED_LINES = offsetof(hxCompleted, contact) / (HX_SLOTS * sizeof(double))
 };
 
 enum { HX_RISE_SAMPLES = 10 }; /* samples in the rise window of 1 ms */
@@ -331,13 +331,15 @@ typedef struct hxState {
   double locked_angle[HX_JOINTS][HX_SLOTS]; /* rad  where it was locked */
   hxBus bus;
   hxFirmware firmware;
-  hxPlantMotion motion;
-  hxContactState contact;
   double evaluations, steps, rejected, touchdowns; /* 1  counts since the start */
+  hxPlantMotion motion; /* hx_copy_state() copies from here to the moment's first row */
+  hxContactState contact;
   hxMeasured measured;
-  hxMoment moment;       /* end of the last step; hx_copy_state() copies what is before it */
+  hxMoment moment;       /* end of the last step */
   hxCompleted completed; /* by plant/continuous.c, model exchange: end of the last step */
 } hxState;
+
+enum { HX_CALL_SIZE = offsetof(hxState, motion) }; /* bytes of what a call changes outside steps */
 
 struct hxPlant {
   hxModel model;
@@ -349,14 +351,14 @@ struct hxPlant {
   hxState state;
   const hxTerrain *terrain; /* of later resets */
   char message[HX_MESSAGE_SIZE];
-  hxFootprintLog footprints; /* outside the state, which every call copies */
+  hxFootprintLog footprints; /* outside the state, which calls copy */
   hxState *state_before; /* that before a call, which one that fails restores: in the work space */
   void *scratch;         /* of the kernels, see kernel.h: the rest of the work space */
 };
 
 /* Copies the parts of a state that a step of this model changes. */
 static inline void hx_copy_state(const hxModel *model, hxState *to, const hxState *from) {
-  memcpy(to, from, offsetof(hxState, moment.contact[1]));
+  memcpy(&to->motion, &from->motion, offsetof(hxState, moment.contact[1]) - HX_CALL_SIZE);
   for (int k = 1; k < model->listed; ++k)
     to->moment.contact[model->row[k]] = from->moment.contact[model->row[k]];
   if (model->foot_rows > 1) memcpy(to->moment.share, from->moment.share, sizeof to->moment.share);

@@ -239,3 +239,21 @@ def test_a_call_that_spends_its_evaluations_says_so_and_changes_nothing(core: ct
     with pytest.raises(PlantError, match=r"limit of evaluations is spent .* 80800 evaluations"):
         plant.step(0.002)
     assert plant.save() == before
+
+
+@pytest.mark.parametrize("release", [False, True])
+def test_a_call_that_fails_at_once_restores_what_it_changed_before(
+    core: ct.CDLL, release: bool
+) -> None:
+    """The call follows coordinates that were set, or releases a joint, which loses energy."""
+    plant = Plant(core, load_robot("athena"))
+    lock = np.zeros((6, 3))
+    lock[0, 1] = 1.0
+    plant.step(0.05, lock=lock)
+    if not release:
+        plant.coordinates = plant.coordinates + 1e-6
+    before = plant.save()
+    command = Command(angle_ref=plant.robot.stance, push_force=np.array([1e8, 0.0, 0.0]))
+    with pytest.raises(PlantError, match=r"finds no step|limit of evaluations"):
+        plant.step(plant.time + 0.1, command, None if release else lock)
+    assert plant.save() == before

@@ -84,8 +84,7 @@ void hx_supply_power(hxCommand *command, const hxModel *model, const hxState *st
   command->supply = sags ? supply_share(command, model, &state->moment) : 1.0;
 }
 
-/* ------------------------------------------------------------------------------------------- bus
- */
+/* ---- bus ---- */
 
 static const double bus_margin = 1e-9; /* s  transmissions this early or late are on time */
 
@@ -126,8 +125,7 @@ double hx_bus_end(const hxModel *model, const hxState *state, double t_end) {
   return next > state->time && next < t_end - bus_margin ? next : t_end;
 }
 
-/* ------------------------------------------------------------------------------------- firmware
- */
+/* ---- firmware ---- */
 
 /* Returns the speed, rad/s, at which a setpoint follows a commanded angle for a time h, s
  * (eq. 57). */

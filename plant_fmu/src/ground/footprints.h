@@ -1,5 +1,5 @@
-/* footprints.h - where feet have stood in soil: a ring of footprints, outside the state that every
- * call copies. A new footprint takes the place of the oldest one when the ring is full.
+/* footprints.h - where feet have stood in soil: a ring of footprints, outside the state that calls
+ * copy. A new footprint takes the place of the oldest one when the ring is full.
  *
  * A call that fails takes back the footprints that it made. The entries that it overwrote are kept
  * for that.

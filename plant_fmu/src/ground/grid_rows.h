@@ -215,8 +215,7 @@ static inline hxMask wanted_lanes(const hxContactState *state, int row, int slot
 }
 
 /* Returns the distances of feet from the tops of the columns that are held for them, or below them;
- * with the bits of hx_terrain_face. `nodes`: of the held cells, from an earlier look-up; NULL: none
- */
+ * with the bits of hx_terrain_face. `nodes`: of the held cells, from an earlier look-up, or NULL */
 HX_RARE hxGround hx_block_tops(const hxModel *model, const hxContactState *state, int slot, int all,
                                const hxVec3 *point, hxPatchNodes *nodes) {
   const hxTerrain *terrain = model->terrain;

@@ -1,7 +1,6 @@
 /* sharing.h - shares of the faces, edges and corners of blocks that carry the same part of a foot
- * (eq. 59); models/contact/geometry.py is the readable form. For numbers with and without a
- * derivative.
- */
+ * (eq. 59); models/contact/geometry.py is the readable form. For numbers with and without
+ * a derivative. */
 #ifndef HX_SHARING_H
 #define HX_SHARING_H
 

@@ -74,8 +74,7 @@ static inline void cubic_weights(hxReal t, hxReal w[3][4]) {
 }
 
 /* Replaces weights of places beyond the grid, where the slope across its border runs out: with b
- * and s at the border the height is b + s (1 - (1 - u)^3)/3 of the run-out's length, u from 0 to 1.
- */
+ * and s at the border the height is b + s (1 - (1 - u)^3)/3 run-out lengths, u in [0, 1]. */
 HX_RARE void run_out(const hxGridPlace *at, hxReal per_cell, hxReal w[3][4]) {
   const double length = 0.06; /* m */
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0), cells = length * per_cell;

@@ -174,16 +174,9 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   hx_copy_moment(model, &state->moment, end);
   if (hx_has_cells(model)) settle_cells(model, state);
   hx_fill_measured_slots(model, state);
-  for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    hx_fill_slots(state->completed.motor[joint]);
-    hx_fill_slots(state->completed.gear[joint]);
-    hx_fill_slots(state->completed.stop[joint]);
-  }
+  fill_lines(&state->completed, HX_COMPLETED_LINES);
   for (int k = 0; k < model->listed; ++k)
-    for (int i = 0; i < 3 && model->row[k] != HX_TORSO; ++i)
-      hx_fill_slots(state->completed.contact[model->row[k]][i]);
-  for (int row = 0; row < HX_FOOT_ROWS; ++row)
-    for (int i = 0; i < 3; ++i) hx_fill_slots(state->completed.moment[row][i]);
+    if (model->row[k] != HX_TORSO) fill_lines(state->completed.contact[model->row[k]], 3);
 }
 
 /* Returns whether a group of outputs depends on accelerations. */

@@ -10,8 +10,8 @@ static const double step_floor = 1e-11; /* s  the error control fails below this
 /* 1, 1/s, 1  limits of a call's steps, so that every call ends: base, per second, highest; of fixed
  * steps, and of attempts under error control */
 static const double step_limits[3] = {1e5, 1e5, 1e6}, attempt_limits[3] = {2e4, 1e5, 1e6};
-static const double touch_depth[2] = {
-    1e-10, 1e-6}; /* m, m per tolerance  a touch-down is located to this depth */
+/* m, m per tolerance  a touch-down is located to this depth */
+static const double touch_depth[2] = {1e-10, 1e-6};
 
 /* ---- touch-down ---- */
 
@@ -232,10 +232,9 @@ static hxStatus advance_step(const hxStart *start, double h_max, double *next_st
                              double *taken, int *event, char *message) {
   const hxModel *model = start->model;
   hxTrial *trial = &start->scratch->trial;
-  double h = model->step > 0.0
-                 ? h_max
-                 : h_max / ceil(fmax(1.0, h_max / *next_step -
-                                              1e-9)); /* equal steps; 1e-9: rounding adds no step */
+  /* equal steps; 1e-9: rounding adds no step */
+  const double count = ceil(fmax(1.0, h_max / *next_step - 1e-9));
+  double h = model->step > 0.0 ? h_max : h_max / count;
   trial->error = 0.0;
   for (;;) {
     if (state->evaluations >= start->scratch->last_evaluation)
@@ -264,14 +263,17 @@ static hxStatus advance_step(const hxStart *start, double h_max, double *next_st
     hx_moment_of(model, start->contact, &trial->y, end);
   }
   end->time = start->t + *taken;
+  if (*taken < h_max || !start->is_last) hx_keep_state(model, state, start->events);
+  if (start->command->time == start->t && !start->events->continues)
+    hx_reset_peaks(&state->measured);
   measure_step(start, seen, *taken, end, state, trial);
   state->motion = trial->y;
   state->steps += 1.0;
   if (hx_has_cells(model)) hx_cross_cells(seen, &depths, state);
   keep_nearest_points(model, state);
   if (model->has_soil) hx_depths_of_moment(seen, &state->contact, &state->moment, &depths);
-  *event = hx_switch_contacts(seen, &depths, start->t + *taken, &state->moment, start->footprints,
-                              state);
+  *event = hx_switch_contacts(seen, &depths, start->t + *taken, &state->moment,
+                              start->events->footprints, state);
   if (*event && model->foot_rows > 1) hx_moment_shares(model, &state->contact, &state->moment);
   start->scratch->is_soil_known = model->has_soil && !*event;
   return HX_OK;
@@ -297,13 +299,14 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
                    .contact = &state->contact,
                    .method = hx_method(model->method),
                    .y = &state->motion,
-                   .footprints = events->footprints,
+                   .events = events,
+                   .is_last = t_end == events->t_end,
                    .scratch = scratch};
   const int rows = model->listed, foot_rows = model->foot_rows;
   const hxModel *feet = rows > foot_rows ? events->feet : model;
   start.touch_depth = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
-  double first = fmin(state->first_step,
-                      state->next_step); /* new inputs cause a larger error than the last step's */
+  /* new inputs cause a larger error than the last step's */
+  double first = fmin(state->first_step, state->next_step);
   double *next_step = command->time < state->time ? &state->next_step : &first;
   while (state->time < t_end && !hx_ends_here(events)) {
     const double left = t_end - state->time;
@@ -334,8 +337,7 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const 
   if (count > allowed) {
     hx_print(message, HX_MESSAGE_SIZE,
              "solver.step: got %.3g s, which makes %.0f steps of this call, expected at most %.0f; "
-             "raise solver.step "
-             "or make shorter calls",
+             "raise solver.step or make shorter calls",
              model->step, count, allowed);
     return HX_STEP_TOO_SMALL;
   }
@@ -359,8 +361,6 @@ static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, con
   ((hxScratch *)scratch)->is_soil_known = 0;
   if (state->moment.stale != 0.0) hx_moment_update(model, state);
   keep_nearest_points(model, state);
-  if (command->time == state->time && t_end > state->time && !events->continues)
-    hx_reset_peaks(&state->measured);
   const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(
       model, command, ramp, t_end, events, state, scratch, message);
   memset(state->contact.nearest, 0, sizeof state->contact.nearest);

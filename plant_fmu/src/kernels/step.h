@@ -45,7 +45,8 @@ typedef struct {
   double t;
   double touch_depth; /* m  largest depth of a contact that has just touched down */
   const hxPlantMotion *y;
-  hxFootprintLog *footprints;
+  hxEvents *events;
+  int is_last; /* 1: the call ends with this interval */
   hxScratch *scratch;
 } hxStart;
 
@@ -302,8 +303,8 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
   const int estimates = model->step == 0.0;
   hxStepEnd end = end_step(model, start->y, h, m, estimates, k, &trial->y);
   trial->error = estimates ? error_norm(model, &end) : 0.0;
-  trial->y.actuator_work =
-      start->y->actuator_work; /* measure_step() adds those of the accepted step */
+  /* measure_step() adds those of the accepted step */
+  trial->y.actuator_work = start->y->actuator_work;
   trial->y.push_work = start->y->push_work, trial->y.dissipated = start->y->dissipated;
   normalise_quaternions(&trial->y, &end.zeros);
   trial->is_finite = is_zero(end.zeros);

@@ -23,8 +23,7 @@ HX_INLINE hxReal ratio(hxReal x, hxReal y) {
   return hx_select(some, x / hx_select(some, y, hx_splat(1.0)), zero);
 }
 
-/* The points p + s a and q + t b of two lines, s and t in [0, 1], that are nearest to each other.
- */
+/* The points p + s a and q + t b of two lines that are nearest to each other, s and t in [0, 1] */
 typedef struct {
   hxReal s, t;
   hxReal square; /* m2  squared distance */

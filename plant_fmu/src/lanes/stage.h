@@ -258,8 +258,7 @@ HX_INLINE hxContactBlock contact_block(const hxImplicit *implicit, const hxConta
   return (hxContactBlock){contact->kin.normal, across, along};
 }
 
-/* Returns B a, the force by which an acceleration of the contact point reduces the contact's force.
- */
+/* Returns B a, by which an acceleration of the contact point reduces the contact's force. */
 HX_INLINE hxVec3 contact_resistance(const hxContactBlock *B, hxVec3 a) {
   return hx_add_scaled(hx_scale(B->across, a), B->along * hx_dot(B->n, a), B->n);
 }

@@ -270,14 +270,10 @@ static inline int hx_switch_contacts(const hxModel *model, hxDepths *depths, dou
   if (model->has_soil) hx_soil_switch(model, at, depths, footprints, &state->contact);
   if (!hx_contact_is_due(model, depths, &state->contact)) return 0;
   int before[HX_SLOTS], after[HX_SLOTS];
-  feet_on_ground(model, &state->contact, before);
-  if (model->foot_rows > 1) {
-    const hxContactState was = state->contact;
-    state->touchdowns += hx_contact_switch(model, depths, &state->contact);
-    hx_contact_continue_impacts(model, at, &was, &state->contact);
-  } else {
-    state->touchdowns += hx_contact_switch(model, depths, &state->contact);
-  }
+  const hxContactState was = state->contact;
+  state->touchdowns += hx_contact_switch(model, depths, &state->contact);
+  if (model->foot_rows > 1) hx_contact_continue_impacts(model, at, &was, &state->contact);
+  feet_on_ground(model, &was, before);
   feet_on_ground(model, &state->contact, after);
   for (int slot = 0; slot < HX_SLOTS; ++slot)
     if (after[slot] && !before[slot]) start_landing(slot, t, &state->measured);

@@ -120,6 +120,13 @@ static hxStatus advance_part(hxPlant *plant, const hxStepCall *call, double t_en
   return status;
 }
 
+/* Returns whether a call may change before its first step what steps change: by locks, or because
+ * coordinates were set. */
+static int changes_before_steps(const hxPlant *plant, const hxInput *input) {
+  const double locks = hx_largest(0.0, input->lock, HX_LEGS * HX_JOINTS);
+  return (plant->model.stops & 2) || locks > 0.0 || plant->state.moment.stale != 0.0;
+}
+
 /* Advances the plant. */
 static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end,
                         hxEvents *events) {
@@ -134,19 +141,22 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   hxStatus status = check_end(plant, t_end);
   if (status == HX_OK) status = hx_input_check(input, plant->message);
   if (status != HX_OK) return status;
-  hx_copy_state(&plant->model, before, &plant->state);
+  memcpy(before, &plant->state, HX_CALL_SIZE);
   const int compared = !ramp && (events->stop || before->call_input != 0.0);
   const hxStepCall call = {input, ramp, compared ? input_fingerprint(input) : 0.0, before->time};
-  const int locks = hx_plant_update_locks(plant, input);
   hx_footprints_begin(&plant->footprints);
   events->footprints = &plant->footprints;
   events->feet = &plant->feet;
+  events->t_end = t_end, events->before = before;
+  if (changes_before_steps(plant, input)) hx_keep_state(&plant->model, &plant->state, events);
+  const int locks = hx_plant_update_locks(plant, input);
   do {
     status = advance_part(plant, &call, t_end, events);
     events->continues = 1;
   } while (status == HX_OK && plant->state.time < t_end && !hx_ends_here(events));
   if (status == HX_OK) return HX_OK;
-  hx_copy_state(&plant->model, &plant->state, before);
+  memcpy(&plant->state, before, HX_CALL_SIZE);
+  if (!events->before) hx_copy_state(&plant->model, &plant->state, before);
   if (locks) hx_plant_derive_stops(plant);
   hx_footprints_take_back(&plant->footprints);
   return status;

@@ -45,8 +45,7 @@ hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates 
  * another's within their rounding (docs/equations.md). */
 static const double switch_band = 1e-10;
 
-/* Switches the contacts that are due and have no indicator: those of feet with walls. Others stay.
- */
+/* Switches contacts that are due and have no indicator: those of feet with walls. Others stay. */
 static void switch_walls(hxPlant *plant) {
   hxDepths depths;
   const hxModel *model = &plant->model;

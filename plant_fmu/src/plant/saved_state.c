@@ -8,32 +8,31 @@
 #include "hexapod/status.h"
 #include "parts.h"
 
-/* A saved state: a head that identifies it, then the plant's model and state. */
+/* The head of a saved state, which identifies it. */
 typedef struct {
   uint64_t magic, version, size, checksum;
-  uint64_t terrain; /* checksum of the grid; 0: none. The head ends here */
+  uint64_t terrain; /* checksum of the grid; 0: none */
+} hxSavedHead;
+
+typedef struct {
+  hxSavedHead head;
   hxModel model;
   hxState state;
   hxFootprints footprints; /* the last ones; unused entries are 0 */
 } hxSavedPlant;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 19;
+static const uint64_t saved_version = 20;
 
 /* Returns the checksum of a saved plant's bytes behind it, of the ring those of its footprints. */
 static uint64_t checksum(const unsigned char *bytes, int footprints) {
   const size_t used = (size_t)footprints * sizeof(hxFootprint),
                end = offsetof(hxSavedPlant, footprints.footprint) + used;
-  return hx_checksum(0, bytes + offsetof(hxSavedPlant, terrain),
-                     end - offsetof(hxSavedPlant, terrain));
+  const size_t begin = offsetof(hxSavedPlant, head.terrain);
+  return hx_checksum(0, bytes + begin, end - begin);
 }
 
 size_t hx_plant_state_size(void) { return sizeof(hxSavedPlant); }
-
-/* The head of hxSavedPlant. */
-typedef struct {
-  uint64_t magic, version, size, checksum, terrain;
-} hxSavedHead;
 
 /* The saved plant is put together in the caller's bytes, which may have any alignment. */
 void hx_plant_get_state(const hxPlant *plant, void *bytes) {
