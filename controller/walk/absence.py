@@ -28,20 +28,21 @@ LIMP_WAY = 0.25  # rad    from its place, at which a faulty joint has another on
 FOLD_MARGIN = 0.1  # rad    of a folded joint from its limit
 TRIAL_SWING, TRIAL_TIME = 0.08, 1.0  # rad, s    size and period of the swing of a faulty joint
 ARRIVED = 1e-3  # rad    a command this near to the plan is the plan
+# leg that steps first without a leg, forwards and backwards: without the foremost of a side the
+# rearmost one there, so that the feet beside the torso step before it stands on them alone
+FIRST = np.array([[2, 4, 3, 5, 1, 0], [5, 4, 0, 2, 1, 3]])
 
 
 def gait_without(gait: Gait, absent: Mask, *, backwards: bool) -> Gait:
     """Returns the wave of the legs that are not absent (6,), or the gait if none is."""
     if not absent.any():
         return gait
-    phases = PATTERNS["wave"].offsets
-    order = sorted(np.flatnonzero(~absent).tolist(), key=lambda leg: phases[leg])
-    if not backwards:
-        order.reverse()
-    count, offsets = len(order), np.zeros(LEGS)
+    phases, turn = PATTERNS["wave"].offsets, 1.0 if backwards else -1.0
+    begin = phases[FIRST[int(backwards)][int(np.argmax(absent))]]
+    order = sorted(np.flatnonzero(~absent), key=lambda leg: turn * (phases[leg] - begin) % 1.0)
+    # an absent leg gives up its load while it stands by the clock
+    count, offsets = len(order), np.full(LEGS, 0.5)
     offsets[order] = -np.arange(count) / count % 1.0
-    # an absent leg gives up its load while it stands by the clock: the one opposite it steps first
-    offsets[absent] = (offsets[::-1][absent] + 0.5) % 1.0
     swing = SWIFT * gait.period * (1.0 - gait.duty)
     return Gait(
         name=gait.name,

@@ -221,8 +221,8 @@ class FootPaths(Stateful):
         """Begins the walk anew with feet that stand under a moving body (C55).
 
         One leg begins to give up its load: the first of those with which the farthest foot goes
-        least far; the one opposite a leg out of service (C58), where the torso is not over the
-        others yet. A leg that is back in service instead begins in the middle of its swing.
+        least far; with one leg out of service the first of the gait (C58). A leg that is back in
+        service instead begins in the middle of its swing.
         """
         clock = self.clock
         if not clock.walking:
@@ -231,8 +231,7 @@ class FootPaths(Stateful):
         unloads, offset = clock.unloads, np.array(self.gait.offsets)
         if returning_leg is not None:
             clock.start_at(0.5 + 0.5 * self.gait.duty + offset - offset[returning_leg])
-        opposite = clock.absent[::-1] & ~clock.absent
-        able = opposite if some(opposite) else ~clock.absent
+        able = offset == 0.0 if clock.absent.sum() == 1 else ~clock.absent
         for first in np.flatnonzero(able) if returning_leg is None else ():
             begin = unloads + (offset - offset[first])
             far = self._farthest(feet, begin)

@@ -36,25 +36,27 @@ static const double fold_margin = 0.1;  /* rad  of a folded joint from its limit
 static const double trial_swing = 0.08; /* rad  size of the swing of a faulty joint */
 static const double trial_time = 1.0;   /* s  its period */
 static const double arrived = 1e-3;     /* rad  a command this near to the plan is the plan */
+/* leg that steps first without a leg, forwards and backwards: without the foremost of a side the
+ * rearmost one there, so that the feet beside the torso step before it stands on them alone */
+static const int steps_first[2][HX_LEGS] = {{2, 4, 3, 5, 1, 0}, {5, 4, 0, 2, 1, 3}};
 
 /* Changes a gait to the wave of the legs that are not absent, if any is absent. */
 HX_RARE void hx_gait_without(hxGait *gait, const int absent[HX_LEGS], int backwards) {
   const hxGait wave = {.pattern = HX_PATTERN_WAVE};
   const int count = HX_LEGS - hx_marked(absent);
-  double phase[HX_LEGS];
+  double phase[HX_LEGS], way[HX_LEGS]; /* way: in the wave, from the leg that steps first */
+  int lost = 0;
   hx_gait_offsets(&wave, phase);
   if (count == HX_LEGS) return;
+  while (!absent[lost]) ++lost;
+  const double turn = backwards ? 1.0 : -1.0, begin = phase[steps_first[backwards][lost]];
+  for (int leg = 0; leg < HX_LEGS; ++leg) way[leg] = hx_fraction(turn * (phase[leg] - begin));
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int place = 0; /* of the leg in the order in which the feet lift off */
-    for (int k = 0; k < HX_LEGS; ++k)
-      place += !absent[k] && (backwards ? phase[k] < phase[leg] : phase[k] > phase[leg]);
-    gait->offset[leg] = absent[leg] || place == 0 ? 0.0 : 1.0 - (double)place / count;
-  }
-  /* an absent leg gives up its load while it stands: the leg opposite it steps first */
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int opposite = HX_LEGS - 1 - leg;
-    const double phase_of_it = absent[opposite] ? 0.0 : gait->offset[opposite];
-    if (absent[leg]) gait->offset[leg] = hx_fraction(phase_of_it + 0.5);
+    for (int k = 0; k < HX_LEGS; ++k) place += !absent[k] && way[k] < way[leg];
+    gait->offset[leg] = place == 0 ? 0.0 : 1.0 - (double)place / count;
+    /* an absent leg gives up its load while it stands by the clock */
+    if (absent[leg]) gait->offset[leg] = 0.5;
   }
   const double swing = swift * gait->period * (1.0 - gait->duty);
   gait->pattern = HX_PATTERN_CUSTOM;

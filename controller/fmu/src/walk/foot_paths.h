@@ -268,17 +268,14 @@ HX_RARE void hx_foot_paths_join(hxFootPathsModel *model, hxFootPaths *paths, hxP
     rest(model, feet->plane, paths, feet);
     return;
   }
-  int opposite = 0;
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    opposite |= paths->clock.absent[HX_LEGS - 1 - leg] && !paths->clock.absent[leg];
+  const int has_first = hx_marked(paths->clock.absent) == 1;
   if (returning_leg >= 0) {
     for (int leg = 0; leg < HX_LEGS; ++leg)
       begin[leg] = 0.5 + 0.5 * clock->duty + offset[leg] - offset[returning_leg];
     hx_gait_clock_start_at(clock, begin);
   }
   for (int first = 0; returning_leg < 0 && first < HX_LEGS; ++first) {
-    const int *absent = paths->clock.absent;
-    if (absent[first] || (opposite && !absent[HX_LEGS - 1 - first])) continue;
+    if (paths->clock.absent[first] || (has_first && offset[first] > 0.0)) continue;
     for (int leg = 0; leg < HX_LEGS; ++leg) begin[leg] = unloads + (offset[leg] - offset[first]);
     const double far = farthest(model, paths, feet, begin);
     if (far >= least - same_distance) continue;
