@@ -27,9 +27,9 @@ static const double swift = 0.6, low_step = 0.6;
 static const double shift_time = 0.4; /* s  in which the torso moves over the other feet */
 /* s  in which the walk then takes the torso back to its path */
 static const double back_time = 3.0;
-static const double far_shift = 0.045; /* m  at most for each lost leg */
-static const double fold_speed = 4.0;  /* rad/s */
-static const double lead = 0.15;       /* rad  of a command before its joint, at most */
+static const double far_shift = 0.045;  /* m  at most for each lost leg */
+static const double fold_speed = 4.0;   /* rad/s */
+static const double lead = 0.15;        /* rad  of a command before its joint, at most */
 static const double fold_margin = 0.1;  /* rad  of a folded joint from its limit */
 static const double trial_swing = 0.08; /* rad  size of the swing of a faulty joint */
 static const double trial_time = 1.0;   /* s  its period */
