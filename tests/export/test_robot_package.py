@@ -12,6 +12,7 @@ import fmpy
 import numpy as np
 import pytest
 from command import Call
+from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssd
 from gains import PERIOD, make_gains
 
@@ -215,3 +216,10 @@ def test_a_package_for_no_platform_is_refused(setup: ControllerSetup, tmp_path: 
     with pytest.raises(FmuError, match="without binaries"):
         export_package(setup, tmp_path / "no.ssp", platforms=[])
     assert not list(tmp_path.iterdir())
+
+
+def test_the_package_walks_in_fmpy(package: Path) -> None:
+    result = simulate_ssp(str(package), stop_time=3.0, step_size=PERIOD)
+    x, height = (result[f"plant.torso.position[{axis}]"] for axis in (1, 3))
+    assert 0.18 < x[-1] < 0.22  # m    0.08 m/s, after a ramp of a gait period
+    assert height.min() > 0.12
