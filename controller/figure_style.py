@@ -18,6 +18,7 @@ SETTINGS: dict[str, Any] = {
     "xtick.labelsize": 7.0,
     "ytick.labelsize": 7.0,
     "legend.fontsize": 7.5,
+    "axes.titley": 1.0,  # the default place, without a search for ticks above
     "axes.xmargin": 0.0,
     "axes.linewidth": 0.6,
     "xtick.major.width": 0.6,
@@ -30,7 +31,6 @@ SETTINGS: dict[str, Any] = {
     "legend.frameon": False,
     "svg.fonttype": "none",
     "svg.hashsalt": "hexapod",
-    "path.simplify": True,
     "figure.constrained_layout.use": True,
 }
 # metadata by format: equal data, equal files

@@ -153,9 +153,11 @@ def test_a_packages_gravity_is_not_that_of_one_component(name: str) -> None:
 
 
 # the paper's law corrects no path, so that a torso which turned while it tipped stays turned
-@pytest.mark.parametrize(("control", "path_error"), [("compliant", 0.05), ("paper", 0.08)])
+@pytest.mark.parametrize(
+    ("control", "path_error", "peak"), [("compliant", 0.05, 0.8), ("paper", 0.08, 1.2)]
+)
 def test_a_robot_that_loses_a_leg_walks_on_at_its_pace_and_takes_the_leg_back(
-    control: str, path_error: float
+    control: str, path_error: float, peak: float
 ) -> None:
     with Runner() as runner:
         result = runner.simulate(load_scenario("lost_leg", overrides=[f"control={control}"]))
@@ -172,4 +174,6 @@ def test_a_robot_that_loses_a_leg_walks_on_at_its_pace_and_takes_the_leg_back(
     pace = (np.interp(9.0, recording.time, place) - np.interp(7.0, recording.time, place)) / 2.0
     assert pace == pytest.approx(0.08, rel=0.1)
     assert result.metrics["path_error"] < path_error
+    assert result.metrics["peak_force"] < peak  # body weights
+    assert result.facts.walk.fallback == 0.0
     assert result.facts.walk.upright

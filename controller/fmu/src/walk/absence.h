@@ -27,11 +27,9 @@ static const double swift = 0.6, low_step = 0.6;
 static const double shift_time = 0.4; /* s  in which the torso moves over the other feet */
 /* s  in which the walk then takes the torso back to its path */
 static const double back_time = 3.0;
-static const double far_shift = 0.045; /* m  at most for each lost leg */
-static const double fold_speed = 4.0;  /* rad/s */
-static const double lead = 0.15;       /* rad  of a command before its joint, at most */
-/* rad  from its place, at which a faulty joint has another one */
-static const double limp_way = 0.25;
+static const double far_shift = 0.045;  /* m  at most for each lost leg */
+static const double fold_speed = 4.0;   /* rad/s */
+static const double lead = 0.15;        /* rad  of a command before its joint, at most */
 static const double fold_margin = 0.1;  /* rad  of a folded joint from its limit */
 static const double trial_swing = 0.08; /* rad  size of the swing of a faulty joint */
 static const double trial_time = 1.0;   /* s  its period */
@@ -188,10 +186,8 @@ HX_RARE int fold_leg(const hxAbsenceModel *model, const hxLegSolver *leg, int k,
   int there = !lost;
   folded(leg, faulty, locked, target);
   for (int j = 0; j < HX_JOINTS; ++j) {
-    double *command = &absence->command[k][j], *planned = &output->angle_ref[k][j],
-           *place = &absence->place[k][j];
-    if (fabs(angle[j] - *place) > limp_way) *place = angle[j];
-    if (faulty[j]) target[j] = *place + swing;
+    double *command = &absence->command[k][j], *planned = &output->angle_ref[k][j];
+    if (faulty[j]) target[j] = (locked[j] ? absence->place[k][j] : target[j]) + swing;
     const double wanted = lost ? target[j] : *planned;
     const double way = hx_clamp(wanted, leg->angle_min[j], leg->angle_max[j]) - *command;
     const double moved =
