@@ -10,7 +10,6 @@ import typer
 
 from hexapod_cosim.cosim.cli.failures import FELL
 from hexapod_cosim.cosim.cli.options import ControlNames, FmuFile, GainsFile, Json
-from hexapod_cosim.cosim.cli.runs import Words, given_gains
 from hexapod_cosim.cosim.common.installation import require_pyarrow
 
 EPILOG = (
@@ -54,7 +53,8 @@ def study(
     command is started again.
     """
     require_pyarrow("studies", "hexapod study")
-    # imported here: it is slow, and no other command needs it
+    # imported here: both are slow, and help needs neither
+    from hexapod_cosim.cosim.cli.runs import Words, given_gains  # noqa: PLC0415
     from hexapod_cosim.extensions.study.run import Options, run_and_report  # noqa: PLC0415
 
     options = Options(
