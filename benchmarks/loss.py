@@ -128,7 +128,7 @@ def pushed(control: str, law: str) -> Iterator[Scenario]:
         event = f"{{time = {4.0 + 1.5 * phase / 8}, duration = 0.2, force = {force}}}"
         overrides = ["duration=10", "command.vx=0.08", f"events=[{event}]"]
         overrides += [f"control={control}", f"friction.law={law}"]
-        yield load_scenario("walk_flat", overrides=overrides)
+        yield load_scenario("lost_leg", overrides=overrides)  # which names no gait
 
 
 def push_figures(scenario: Scenario) -> tuple[float, float, float]:
