@@ -15,7 +15,7 @@ from hexapod_cosim.extensions.live import page
 from hexapod_cosim.extensions.live.messages import Action, Change, Drive, Leg, Message, Push
 from hexapod_cosim.extensions.live.recording import LONGEST, NO_FORCE, Force, Recording
 from hexapod_cosim.extensions.live.robot import MOST_WEIGHTS, LiveRobot
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models import LEG_NAMES, HexapodError
 
 FRAME = 0.02  # s    between two states that are published
 SILENCE = 1.0  # s    after which a drive or push that was not renewed ends
@@ -139,7 +139,7 @@ class Loop:
     def step(self) -> None:
         """Makes one macro-step under the present inputs."""
         self._command, force = self._inputs()
-        before = self.robot.fault
+        before, absent = self.robot.fault, set(self.robot.absent)
         self.robot.step(self._command, force)
         if self._recording is not None:
             self._recording.note(self._command, force, self.robot.limp)
@@ -147,6 +147,9 @@ class Loop:
                 self._end_recording()
         if self.robot.fault != before:
             self._note(self.robot.fault)
+        for leg in sorted(absent ^ set(self.robot.absent)):
+            how = "with" if leg in absent else "without"
+            self._note(f"The controller walks {how} leg {LEG_NAMES[leg]}.")
 
     def _inputs(self) -> tuple[BodyCommand, Force]:
         """Returns the command and the force of the next macro-step.
@@ -232,8 +235,7 @@ class Loop:
     # ------------------------------------------------------------------------------- output
 
     def _world(self) -> dict[str, Any]:
-        robot = self.robot
-        return page.describe_world(robot.plan.robot, robot.parameters, robot.h)
+        return page.describe_world(self.robot.plan.robot, self.robot.parameters, self.robot.h)
 
     def _note(self, text: str) -> None:
         """Publishes a sentence."""

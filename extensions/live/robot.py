@@ -146,6 +146,12 @@ class LiveRobot(Closing):
         return f"Leg {LEG_NAMES[leg]} {'is limp' if weakness[leg, 0] else 'works again'}."
 
     @property
+    def absent(self) -> tuple[int, ...]:
+        """The legs that the controller walks without."""
+        shown = getattr(self._controller, "diagnostics", None)
+        return tuple(np.flatnonzero(getattr(shown, "absent", ())).tolist())
+
+    @property
     def limp(self) -> tuple[int, ...]:
         """The legs that are limp."""
         return tuple(np.flatnonzero(self._servos[: LEGS * JOINTS : JOINTS]).tolist())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -128,6 +129,20 @@ def test_the_last_drive_moves_the_robot_until_its_page_falls_silent(loop: Loop, 
     assert frame["command"][:3] == [0.0, 0.0, 0.0]
     assert frame["command"][3] > 0.0  # its height stays
     assert frame["push"] == [0.0, 0.0, 0.0]
+
+
+def test_pages_are_told_which_leg_the_controller_walks_without(loop: Loop, side: Side) -> None:
+    loop.robot.place(replace(loop.robot.choices.first(), control="compliant"))
+    for note in (
+        ("Leg LM is limp.", "The controller walks without leg LM."),
+        ("Leg LM works again.", "The controller walks with leg LM."),
+    ):
+        side.sent.clear()
+        loop.post(Leg(1))
+        for _ in range(10):
+            loop.post(FORWARD)
+            turn(loop, 100)
+        assert side.notes() == list(note)
 
 
 def test_a_push_is_limited_to_three_weights_whatever_a_page_asks_for(
