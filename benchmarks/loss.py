@@ -11,10 +11,8 @@ import csv
 import math
 from argparse import ArgumentParser
 from collections.abc import Iterator, Sequence
-from functools import cache
 from itertools import combinations, product
 from multiprocessing import Pool
-from multiprocessing.util import Finalize
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +20,7 @@ import numpy as np
 from benchmarks import RESULTS
 from hexapod_cosim.cosim.results.facts import Result
 from hexapod_cosim.cosim.results.summary import summarise
-from hexapod_cosim.cosim.run.runner import Runner
+from hexapod_cosim.cosim.run.batch import process_runner
 from hexapod_cosim.cosim.scenario.events import WHOLE_LEG
 from hexapod_cosim.cosim.scenario.reading import load_scenario
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -30,7 +28,7 @@ from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 FIGURES = ("arrives", "path", "peak", "noticed", "regained")
 SEEDS = 1  # by default, as on the page
-LOST = 5.0  # s    time of the loss
+LOST, AMBLE = 5.0, 1.5  # s    time of the loss, and period of the gait
 PATH, PEAK = 0.05, 0.8  # m/m, BW    largest path error and peak force of a good walk
 REGAINED = 3.0  # s    longest time from the notice to the commanded speed
 PACE, MEAN_TIME = 0.95, 2.0  # 1, s    share of the commanded speed, and time of its mean
@@ -78,19 +76,11 @@ def walks(control: str, loss: str, ground: str, seeds: int) -> Iterator[Scenario
         yield load_scenario("lost_leg", overrides=overrides)
 
 
-@cache
-def runner() -> Runner:
-    """Returns the runner of this process, which is closed when the process ends."""
-    made = Runner()
-    Finalize(made, made.close, exitpriority=1)
-    return made
-
-
 def judged(scenario: Scenario) -> tuple[bool, ...]:
     """Runs a walk. Returns whether it arrived, and whether it did so within PATH, within PEAK, with
     a notice within one gait period, and at the commanded speed again within REGAINED of the notice.
     """
-    result = runner().simulate(scenario)
+    result = process_runner().simulate(scenario)
     summary, notice = summarise(result), notice_time(result)
     noticed = notice is not None and notice - LOST <= result.facts.gait_period
     regained = slow_until(result) - (notice or LOST) <= REGAINED
@@ -125,7 +115,7 @@ def pushed(control: str, law: str) -> Iterator[Scenario]:
     for phase, direction in product(range(8), range(8)):
         angle = 0.25 * math.pi * direction
         force = [round(50.0 * math.cos(angle), 6), round(50.0 * math.sin(angle), 6), 0.0]
-        event = f"{{time = {4.0 + 1.5 * phase / 8}, duration = 0.2, force = {force}}}"
+        event = f"{{time = {4.0 + AMBLE * phase / 8}, duration = 0.2, force = {force}}}"
         overrides = ["duration=10", "command.vx=0.08", f"events=[{event}]"]
         overrides += [f"control={control}", f"friction.law={law}"]
         yield load_scenario("lost_leg", overrides=overrides)  # which names no gait
@@ -133,7 +123,7 @@ def pushed(control: str, law: str) -> Iterator[Scenario]:
 
 def push_figures(scenario: Scenario) -> tuple[float, float, float]:
     """Runs a walk. Returns whether it arrived, its peak force [BW] and its path error [m/m]."""
-    summary = summarise(runner().simulate(scenario))
+    summary = summarise(process_runner().simulate(scenario))
     return summary.success, summary.metrics["peak_force"], summary.metrics["path_error"]
 
 

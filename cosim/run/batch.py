@@ -128,11 +128,11 @@ def _run(task: _Task, runner: Runner | None = None) -> Summary:
 
 def _run_compiled(task: _Task) -> Summary:
     """Runs a task in a worker process on the compiled controller."""
-    return _run(task, _process_runner())
+    return _run(task, process_runner())
 
 
 @cache
-def _process_runner() -> Runner:
+def process_runner() -> Runner:
     """Returns the runner of this worker process, which is closed when the process ends."""
     runner = Runner()
     Finalize(runner, runner.close, exitpriority=1)
